@@ -1,0 +1,88 @@
+"""The camera: scaled orthography (Eq. 7, 8) and perspective as one model, and rotations as quaternions."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole in pixels; an infinite focal length is the paper's scaled-orthographic camera.
+
+    Attributes:
+        focal_px: focal length, > 0; `inf` for orthography.
+        center_px: (2,) principal point.
+    """
+
+    focal_px: float = np.inf
+    center_px: Array = field(default_factory=lambda: np.zeros(2))
+
+    @property
+    def perspective(self) -> bool:
+        """Whether depth changes the apparent size."""
+        return bool(np.isfinite(self.focal_px))
+
+    @property
+    def K(self) -> Array:
+        """(3, 3) intrinsics; focal length 1 where it is infinite."""
+        f = self.focal_px if self.perspective else 1.0
+        return np.array([[f, 0.0, self.center_px[0]], [0.0, f, self.center_px[1]], [0.0, 0.0, 1.0]])
+
+    def project(self, points: Array) -> Array:
+        """Image (..., 2, p) px of points (..., 3, p) in camera axes; orthography drops the depth."""
+        xy, z = points[..., :2, :], points[..., 2:3, :]
+        scaled = xy * (self.focal_px / z) if self.perspective else xy
+        return scaled + self.center_px[:, None]
+
+
+def rotation_from_quaternion(q: Array) -> Array:
+    """Rotations (..., 3, 3) of unit quaternions (..., 4), w first."""
+    w, x, y, z = np.moveaxis(np.asarray(q, np.float64), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quaternion_product(a: Array, b: Array) -> Array:
+    """Hamilton product (..., 4) of quaternions (..., 4), w first: R(ab) = R(a) R(b)."""
+    aw, av = a[..., :1], a[..., 1:]
+    bw, bv = b[..., :1], b[..., 1:]
+    scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
+    return np.concatenate([scalar, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+
+
+def quaternion_exp(theta: Array) -> Array:
+    """Unit quaternions (..., 4) that turn by the rotation vectors `theta` (..., 3) in radians."""
+    angle = np.linalg.norm(theta, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * theta], axis=-1)
+
+
+def quaternion_from_rotation(R: Array) -> Array:
+    """Unit quaternion (4,), w first and >= 0, of the rotation R (3, 3)."""
+    # Bar-Itzhack: the leading eigenvector of this symmetric matrix; no branches, and the nearest rotation for a noisy R.
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R
+    N = np.array(
+        [
+            [xx + yy + zz, zy - yz, xz - zx, yx - xy],
+            [zy - yz, xx - yy - zz, yx + xy, zx + xz],
+            [xz - zx, yx + xy, yy - xx - zz, zy + yz],
+            [yx - xy, zx + xz, zy + yz, zz - xx - yy],
+        ]
+    )
+    q: Array = np.linalg.eigh(N)[1][:, -1]
+    return q if q[0] >= 0 else -q
+
+
+def nearest_rotation(M: Array) -> Array:
+    """The rotation (..., 3, 3) nearest to M (..., 3, 3) in the Frobenius norm (orthogonal Procrustes)."""
+    U, _, Vt = np.linalg.svd(M)
+    sign = np.linalg.det(U @ Vt)
+    U = np.concatenate([U[..., :2], U[..., 2:] * sign[..., None, None]], axis=-1)
+    R: Array = U @ Vt
+    return R
