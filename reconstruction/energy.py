@@ -1,0 +1,286 @@
+"""The energy of the on-line bundle adjustment (paper §5) and its derivatives, one function per term.
+
+A window of n frames holds q, t, log s and Λ' = Λ/√p per frame. Every term is a sum of squares; it returns its value, half
+its gradient and the Gauss-Newton approximation of half its Hessian, which is block tridiagonal over frames: the data and
+the priors couple nothing, smoothness couples neighbours. A frame's d = 6 + (free rows of Λ)·r parameters are ordered
+[θ (3, rotation vector applied on the right), t (2), log s, free rows of Λ' (row by row)].
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction import statistics
+from reconstruction.camera import quaternion_exp, quaternion_product, rotation_from_quaternion
+from reconstruction.statistics import Statistics
+
+Array = NDArray[np.float64]
+
+POSE = 6  # θ, t, log s
+HAT = np.zeros((3, 3, 3))  # HAT[k] = [e_k]×
+for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+    HAT[i, k, j], HAT[i, j, k] = 1.0, -1.0
+
+
+@dataclass(frozen=True)
+class State:
+    """Pose and coefficients of n frames in the principal frame, lengths in units of the rest shape's RMS radius.
+
+    Attributes:
+        q: (n, 4) unit quaternions of R' = RΦ, w first.
+        t: (n, 2) image translation.
+        log_s: (n,) logarithm of the scale.
+        Lambda: (n, 3, r) Λ' = Λ/√p.
+    """
+
+    q: Array
+    t: Array
+    log_s: Array
+    Lambda: Array
+
+    def __len__(self) -> int:
+        return len(self.log_s)
+
+    def __getitem__(self, frames: slice) -> "State":
+        return State(self.q[frames], self.t[frames], self.log_s[frames], self.Lambda[frames])
+
+    def moved(self, step: Array, rows: tuple[int, ...]) -> "State":
+        """The state after a step (n, d) in the local parameters, with the given rows of Λ free."""
+        Lambda = self.Lambda.copy()
+        Lambda[:, rows, :] += step[:, POSE:].reshape(len(self), len(rows), -1)
+        q = quaternion_product(self.q, quaternion_exp(step[:, :3]))
+        q /= np.linalg.norm(q, axis=1, keepdims=True)
+        return State(q, self.t + step[:, 3:5], self.log_s + step[:, 5], Lambda)
+
+    def scaled_rotations(self) -> Array:
+        """A = sR' (n, 3, 3)."""
+        return np.exp(self.log_s)[:, None, None] * rotation_from_quaternion(self.q)
+
+    def matrices(self) -> Array:
+        """M = [sR', sR'Λ', (t; 0)] (n, 3, 4 + r)."""
+        A = self.scaled_rotations()
+        t = np.pad(self.t, ((0, 0), (0, 1)))[:, :, None]
+        return np.concatenate([A, A @ self.Lambda, t], axis=2)
+
+
+def join(states: list[State]) -> State:
+    """One state of all frames, in order."""
+    fields = ("q", "t", "log_s", "Lambda")
+    return State(*(np.concatenate([getattr(s, name) for s in states]) for name in fields))
+
+
+@dataclass(frozen=True)
+class CoarseEdges:
+    """Edges of a coarse mesh whose lengths the surface keeps (method: coarse since smooth modes cannot stretch between).
+
+    Attributes:
+        rest: (3, e) end minus start in the rest shape S̄'.
+        modes: (r, e) the same of Υ'.
+        length: (e,) rest lengths.
+    """
+
+    rest: Array
+    modes: Array
+    length: Array
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Weights of the terms; each multiplies a sum of squares of dimensionless quantities.
+
+    Attributes:
+        rotation: λ_q on ‖Δq‖² between neighbouring frames.
+        translation: λ_t on ‖Δt‖².
+        scale: λ_s on (Δ log s)².
+        deformation: λ_γ on ‖ΔΛ'‖².
+        rest: λ_0 on ‖Λ'‖², the pull to the rest shape.
+        inextensibility: κ on the mean squared edge strain term of `edges`.
+        rows: rows of Λ that are estimated (§3.4): 0 and 1 stretch in the plane, 2 bends out of it.
+        free_scale: whether s is estimated; the paper's energy keeps s = 1.
+        tied: whether the oldest frame is tied to the frame that has left the window; without, the window floats.
+        edges: coarse edges of the inextensibility term.
+    """
+
+    rotation: float = 1e-3
+    translation: float = 0.0
+    scale: float = 1e-3
+    deformation: float = 1e-2
+    rest: float = 1e-2
+    inextensibility: float = 0.0
+    rows: tuple[int, ...] = (0, 1, 2)
+    free_scale: bool = True
+    tied: bool = True
+    edges: CoarseEdges | None = None
+
+    def rigid(self) -> "Energy":
+        """The same energy with nothing deforming: pose only."""
+        return replace(self, rows=(), edges=None, inextensibility=0.0)
+
+
+@dataclass
+class Normal:
+    """Value of an energy and its block tridiagonal normal equations.
+
+    Attributes:
+        value: (n,) energy per frame; smoothness counts for the later frame.
+        gradient: (n, d) half the gradient.
+        diagonal: (n, d, d) diagonal blocks of half the Gauss-Newton Hessian.
+        coupling: (n-1, d, d) blocks between frame i (rows) and i+1 (columns).
+    """
+
+    value: Array
+    gradient: Array
+    diagonal: Array
+    coupling: Array
+
+
+def evaluate(energy: Energy, data: Statistics, state: State, before: State | None) -> Array:
+    """Energy (n,) per frame; `before` is the frame that has left the window (n = 1)."""
+    value = statistics.value(data, state.matrices()) + energy.rest * (state.Lambda**2).sum(axis=(1, 2))
+    if energy.edges is not None:
+        strain = edge_strain(energy.edges, edge_vectors(energy.edges, state))
+        value += energy.inextensibility * (strain**2).mean(axis=1)
+    value[1:] += smoothness(energy, state[:-1], state[1:])
+    if energy.tied and before is not None:
+        value[:1] += smoothness(energy, before, state[:1])
+    return np.asarray(value)
+
+
+def linearise(energy: Energy, data: Statistics, state: State, before: State | None) -> Normal:
+    """Value, gradient and Gauss-Newton blocks of the whole energy at a state."""
+    n, r = len(state), state.Lambda.shape[2]
+    d = POSE + len(energy.rows) * r
+    normal = Normal(
+        evaluate(energy, data, state, before), np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((n - 1, d, d))
+    )
+    add_data(normal, energy, data, state)
+    add_rest(normal, energy, state)
+    if energy.edges is not None:
+        add_inextensibility(normal, energy, energy.edges, state)
+    add_smoothness(normal, energy, state, before)
+    if not energy.free_scale:
+        normal.gradient[:, 5] = 0.0
+        normal.diagonal[:, 5, :] = normal.diagonal[:, :, 5] = 0.0
+        normal.diagonal[:, 5, 5] = 1.0
+        normal.coupling[:, 5, :] = normal.coupling[:, :, 5] = 0.0
+    return normal
+
+
+def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> None:
+    """Reprojection, quadratic in M: pose by the chain rule, Λ as a Kronecker product of AᵀA and the Υ part of the sums."""
+    n, r = len(state), state.Lambda.shape[2]
+    rows = list(energy.rows)
+    A, M = state.scaled_rotations(), state.matrices()
+    pose = np.zeros((n, POSE, 3, 4 + r))  # dM/d(θ, t, log s)
+    X = np.concatenate([np.broadcast_to(np.eye(3), (n, 3, 3)), state.Lambda], axis=2)
+    pose[:, :3, :, :-1] = A[:, None] @ (HAT @ X[:, None])
+    pose[:, 3, 0, -1] = pose[:, 4, 1, -1] = 1.0
+    pose[:, 5, :, :-1] = M[:, :, :-1]
+    slope = statistics.gradient(data, M)
+    curved = statistics.apply(data.gram, pose)
+    flat = pose.reshape(n, POSE, -1)
+    normal.gradient[:, :POSE] += (flat @ slope.reshape(n, -1, 1))[:, :, 0]
+    normal.diagonal[:, :POSE, :POSE] += flat @ curved.reshape(n, POSE, -1).transpose(0, 2, 1)
+    if not rows or not r:
+        return
+    free = A[:, :, rows]
+    k = len(rows) * r
+    normal.gradient[:, POSE:] += (free.transpose(0, 2, 1) @ slope[:, :, 3:-1]).reshape(n, k)
+    mixed = (free.transpose(0, 2, 1)[:, None] @ curved[:, :, :, 3:-1]).reshape(n, POSE, k)
+    normal.diagonal[:, :POSE, POSE:] += mixed
+    normal.diagonal[:, POSE:, :POSE] += mixed.transpose(0, 2, 1)
+    x, y, z = (free[:, c] for c in range(3))
+    factors = np.stack(
+        [outer(x, x) + outer(y, y), -outer(x, z) - outer(z, x), -outer(y, z) - outer(z, y), outer(z, z)], axis=1
+    )
+    modes = data.gram[:, :, 3:-1, 3:-1]
+    kron = np.einsum("ngij,ngab->niajb", factors, modes, optimize=True)
+    normal.diagonal[:, POSE:, POSE:] += kron.reshape(n, k, k)
+
+
+def add_rest(normal: Normal, energy: Energy, state: State) -> None:
+    """λ_0‖Λ'‖²: the pull to the rest shape."""
+    free = state.Lambda[:, energy.rows, :].reshape(len(state), -1)
+    normal.gradient[:, POSE:] += energy.rest * free
+    diagonal = np.arange(POSE, normal.gradient.shape[1])
+    normal.diagonal[:, diagonal, diagonal] += energy.rest
+
+
+def edge_vectors(edges: CoarseEdges, state: State) -> Array:
+    """Edges (n, 3, e) of the deformed shapes."""
+    return np.asarray(edges.rest + state.Lambda @ edges.modes)
+
+
+def edge_strain(edges: CoarseEdges, vectors: Array) -> Array:
+    """ρ_e = (‖d_e‖² − l_e²)/(2 l_e) (n, e): the change of length to first order, without a square root."""
+    return np.asarray(((vectors**2).sum(axis=1) - edges.length**2) / (2 * edges.length))
+
+
+def add_inextensibility(normal: Normal, energy: Energy, edges: CoarseEdges, state: State) -> None:
+    """κ mean_e ρ_e²: edges of the coarse mesh keep their rest length."""
+    n, count = len(state), len(edges.length)
+    vectors = edge_vectors(edges, state)
+    strain = edge_strain(edges, vectors)
+    direction = (vectors / edges.length)[:, energy.rows, None, :]
+    J = (direction * edges.modes).reshape(n, -1, count)
+    weight = energy.inextensibility / count
+    normal.gradient[:, POSE:] += weight * (J @ strain[:, :, None])[:, :, 0]
+    normal.diagonal[:, POSE:, POSE:] += weight * (J @ J.transpose(0, 2, 1))
+
+
+def smoothness(energy: Energy, earlier: State, later: State) -> Array:
+    """λ_q‖Δq‖² + λ_t‖Δt‖² + λ_s(Δ log s)² + λ_γ‖ΔΛ'‖² (n,) between frames and their successors."""
+    return np.asarray(
+        energy.rotation * (quaternion_difference(earlier.q, later.q) ** 2).sum(axis=1)
+        + energy.translation * ((later.t - earlier.t) ** 2).sum(axis=1)
+        + energy.scale * (later.log_s - earlier.log_s) ** 2
+        + energy.deformation * ((later.Lambda - earlier.Lambda) ** 2).sum(axis=(1, 2))
+    )
+
+
+def quaternion_difference(earlier: Array, later: Array) -> Array:
+    """Δq (n, 4) with the sign of `earlier` that is nearer: q and −q are the same rotation."""
+    nearer = np.where((earlier * later).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    return np.asarray(later - nearer * earlier)
+
+
+def quaternion_tangent(q: Array) -> Array:
+    """dq/dθ (n, 4, 3) of q ⊗ exp(θ/2) at θ = 0."""
+    basis = np.pad(np.eye(3), ((0, 0), (1, 0)))
+    return 0.5 * np.stack([quaternion_product(q, np.broadcast_to(e, q.shape)) for e in basis], axis=2)
+
+
+def add_smoothness(normal: Normal, energy: Energy, state: State, before: State | None) -> None:
+    """Differences of neighbours inside the window, and of the oldest frame to the one that has left it."""
+    tied = energy.tied and before is not None
+    chain = join([before, state]) if tied and before is not None else state
+    earlier, later = chain[:-1], chain[1:]
+    n, d = len(later), normal.gradient.shape[1]
+    if n == 0:
+        return
+    nearer = np.where((earlier.q * later.q).sum(axis=1) < 0, -1.0, 1.0)[:, None, None]
+    J_earlier, J_later = -nearer * quaternion_tangent(earlier.q), quaternion_tangent(later.q)
+    delta = quaternion_difference(earlier.q, later.q)[:, :, None]
+    weights = np.full(d, energy.deformation)
+    weights[3:5], weights[5] = energy.translation, energy.scale
+    change = np.zeros((n, d))
+    change[:, 3:5] = later.t - earlier.t
+    change[:, 5] = later.log_s - earlier.log_s
+    change[:, POSE:] = (later.Lambda - earlier.Lambda)[:, energy.rows, :].reshape(n, -1)
+    plain = np.arange(3, d)
+    for J, sign, frames in ((J_later, 1.0, slice(n)), (J_earlier, -1.0, slice(1, n) if tied else slice(n))):
+        target = slice(0 if tied else 1, None) if sign > 0 else slice(0, len(state) - 1)
+        Jt = energy.rotation * J[frames].transpose(0, 2, 1)
+        normal.gradient[target, :3] += (Jt @ delta[frames])[:, :, 0]
+        normal.gradient[target, 3:] += sign * weights[3:] * change[frames, 3:]
+        normal.diagonal[target, :3, :3] += Jt @ J[frames]
+        normal.diagonal[target, plain, plain] += weights[3:]
+    inner = slice(1, n) if tied else slice(n)
+    normal.coupling[:, :3, :3] += energy.rotation * J_earlier[inner].transpose(0, 2, 1) @ J_later[inner]
+    normal.coupling[:, plain, plain] -= weights[3:]
+
+
+def outer(a: Array, b: Array) -> Array:
+    """Outer products (n, i, j) of vectors (n, i) and (n, j)."""
+    return np.asarray(a[:, :, None] * b[:, None, :])

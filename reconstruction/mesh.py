@@ -1,0 +1,101 @@
+"""Triangle meshes over scattered points: Delaunay, unique edges, coarse versions, barycentric location (paper §3.1)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay, QhullError
+
+from reconstruction import ReconstructionError
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+SLIVER_DEGREES = 5.0  # hull triangles with a smaller angle bridge a dent of the outline and are dropped
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Connectivity only; the vertices move.
+
+    Attributes:
+        faces: (m, 3) vertex indices, counter-clockwise in the plane they were triangulated in.
+        edges: (n, 2) unique vertex pairs, smaller index first.
+    """
+
+    faces: Indices
+    edges: Indices
+
+
+def unique_edges(faces: Indices) -> Indices:
+    """Each edge of the triangles (m, 3) once, as (n, 2) pairs with the smaller index first."""
+    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    edges: Indices = np.unique(np.sort(pairs, axis=1), axis=0)
+    return edges
+
+
+def mesh_from_faces(faces: Indices) -> Mesh:
+    """A mesh of the given triangles (m, 3)."""
+    faces = np.asarray(faces, np.int64)
+    return Mesh(faces, unique_edges(faces))
+
+
+def triangulate(points: Array) -> Mesh:
+    """Delaunay mesh of points (p, 2).
+
+    Raises:
+        ReconstructionError: fewer than 3 points, or all on one line.
+    """
+    if len(points) < 3:
+        raise ReconstructionError(f"cannot make a mesh of {len(points)} points: at least 3 are needed")
+    try:
+        triangulation = Delaunay(points)
+    except QhullError as error:
+        raise ReconstructionError("cannot make a mesh: the points lie on one line; track a wider region") from error
+    faces = triangulation.simplices.astype(np.int64)
+    on_hull = (triangulation.neighbors < 0).any(axis=1)
+    kept = faces[~(on_hull & (smallest_angle(points, faces) < np.deg2rad(SLIVER_DEGREES)))]
+    return mesh_from_faces(kept if np.unique(kept).size == len(points) else faces)
+
+
+def smallest_angle(points: Array, faces: Indices) -> Array:
+    """Smallest angle (m,) in radians of each triangle with corners points (p, d)."""
+    corners = points[faces]
+    lengths = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+    a, b, c = np.sort(lengths, axis=1).T
+    return np.asarray(np.arccos(np.clip((b * b + c * c - a * a) / np.maximum(2 * b * c, 1e-300), -1, 1)))
+
+
+def farthest_points(points: Array, count: int) -> Indices:
+    """Indices of `count` well-spread points of (p, d), farthest-first, starting at the one farthest from the centroid."""
+    distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    chosen = [int(distance.argmax())]
+    nearest = np.linalg.norm(points - points[chosen[0]], axis=1)
+    for _ in range(min(count, len(points)) - 1):
+        chosen.append(int(nearest.argmax()))
+        nearest = np.minimum(nearest, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return np.array(chosen)
+
+
+def locate(points: Array, mesh: Mesh, queries: Array) -> tuple[Indices, Array]:
+    """Where queries (n, 2) lie in the mesh over points (p, 2).
+
+    Returns:
+        face (n,) index of the triangle, −1 outside; weights (n, 3) barycentric coordinates in it.
+    """
+    a, b, c = (points[mesh.faces[:, k]] for k in range(3))
+    face = np.full(len(queries), -1)
+    weights = np.zeros((len(queries), 3))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1.0 / cross2(b - a, c - a)
+        for i, q in enumerate(queries):
+            w = np.stack([cross2(b - q, c - q), cross2(c - q, a - q), cross2(a - q, b - q)], axis=1) * inverse[:, None]
+            inside = np.flatnonzero((w >= -1e-9).all(axis=1))
+            if inside.size:
+                face[i], weights[i] = inside[0], w[inside[0]]
+    return face, weights
+
+
+def cross2(a: Array, b: Array) -> Array:
+    """Cross product (n,) of plane vectors (n, 2)."""
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

@@ -1,0 +1,102 @@
+"""What a frame's points say about the 3x(4+r) matrix M, summed up once: solver iterations never touch the points.
+
+Multiplied out, the perspective image W(1 + z/Z₀) = sRS + t is linear in M = [sR', sR'Λ, (t; 0)] acting on the fixed
+basis B = [S̄'; Υ'; 1ᵀ], with R' = RΦ and S̄' = ΦᵀS̄. With w = W/f the residual of a point with basis column b is
+
+    ρ_c = W_c − M_c b + w_c M_3 b,     c = x, y
+
+so a frame's data term is quadratic in M with five small matrices. f → ∞ is scaled orthography (Eq. 8) on the same path.
+Lengths are in units of the rest shape's RMS radius and Υ' = √p Υ, so nothing depends on image size, p or r.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Data terms of n frames, stacked; K = 4 + r rows of the basis.
+
+    Attributes:
+        gram: (n, 4, K, K) sums over points of h bbᵀ, h w_x bbᵀ, h w_y bbᵀ, h (w_x² + w_y²) bbᵀ, over p.
+        cross: (n, 3, K) sums of h W_x b, h W_y b, h (w·W) b, over p.
+        power: (n,) sums of h |W|², over p.
+    """
+
+    gram: Array
+    cross: Array
+    power: Array
+
+    def __len__(self) -> int:
+        return len(self.power)
+
+
+def frame_statistics(basis: Array, W: Array, weights: Array, focal: float) -> Statistics:
+    """Statistics of one frame (n = 1): one product of (4K, p) by (p, K).
+
+    Args:
+        basis: B (K, p) with the row of ones last.
+        W: (2, p) image points relative to the principal point, units of the rest shape; finite where weighted.
+        weights: (p,) visibility h, 0 or 1, or robust weights.
+        focal: focal length in the same units, `inf` for orthography.
+    """
+    K, p = basis.shape
+    seen = weights > 0
+    if not seen.all():
+        basis, W, weights = basis[:, seen], W[:, seen], weights[seen]
+    moments = weights / p * np.stack([np.ones(len(weights)), W[0], W[1], W[0] ** 2 + W[1] ** 2])
+    sums = ((moments[:, None, :] * basis).reshape(4 * K, -1) @ basis.T).reshape(4, K, K)
+    return from_sums(sums, focal)
+
+
+def down_date(complete: Array, basis: Array, lost: NDArray[np.bool_]) -> Array:
+    """B diag(h) Bᵀ (K, K) from the constant B Bᵀ `complete` by taking the few lost points away."""
+    gone = basis[:, lost]
+    return np.asarray(complete - gone @ gone.T)
+
+
+def from_sums(sums: Array, focal: float) -> Statistics:
+    """Statistics from the weighted sums (4, K, K) with moments 1, W_x, W_y, |W|²; column −1 of B is the ones."""
+    gram = sums * np.array([1.0, 1 / focal, 1 / focal, 1 / focal**2])[:, None, None]
+    cross = sums[1:, :, -1] * np.array([1.0, 1.0, 1 / focal])[:, None]
+    return Statistics(gram[None], cross[None], sums[3, -1, -1][None])
+
+
+def stack(parts: list[Statistics]) -> Statistics:
+    """One Statistics of all frames of the parts, in order."""
+    return Statistics(
+        np.concatenate([s.gram for s in parts]),
+        np.concatenate([s.cross for s in parts]),
+        np.concatenate([s.power for s in parts]),
+    )
+
+
+def gradient(statistics: Statistics, M: Array) -> Array:
+    """Half the derivative (n, 3, K) of the data terms with respect to M (n, 3, K)."""
+    product = apply(statistics.gram, M[:, None])[:, 0]
+    return np.asarray(product - statistics.cross * np.array([1.0, 1.0, -1.0])[:, None])
+
+
+def apply(gram: Array, M: Array) -> Array:
+    """The quadratic form's matrix times M: (n, k, 3, K) for directions M (n, k, 3, K)."""
+    G0, Gx, Gy, G2 = (gram[:, None, i] for i in range(4))
+    x, y, z = (M[:, :, c, None, :] for c in range(3))
+    rows = [x @ G0 - z @ Gx, y @ G0 - z @ Gy, z @ G2 - x @ Gx - y @ Gy]
+    return np.concatenate(rows, axis=2)
+
+
+def value(statistics: Statistics, M: Array) -> Array:
+    """Data terms (n,): Σ_i h_i |ρ_i|² / p."""
+    linear = statistics.cross * np.array([1.0, 1.0, -1.0])[:, None]
+    quadratic = np.einsum("nck,nck->n", M, apply(statistics.gram, M[:, None])[:, 0] - 2 * linear)
+    return np.asarray(statistics.power + quadratic)
+
+
+def residuals(basis: Array, W: Array, M: Array, focal: float) -> Array:
+    """ρ (2, p) of one frame, point by point: what `value` sums up."""
+    seen = M @ basis
+    return np.asarray(W - seen[:2] + W / focal * seen[2])
