@@ -1,0 +1,57 @@
+"""The region of interest: a rectangle or a mask picture."""
+
+from pathlib import Path
+from typing import cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking import TrackingError
+
+
+def region_mask(
+    size: tuple[int, int], roi: tuple[int, int, int, int] | None = None, mask: Path | None = None
+) -> NDArray[np.uint8]:
+    """Where points are looked for: (H, W) uint8, 255 inside.
+
+    Args:
+        size: (width, height) of the video.
+        roi: x, y, width, height of a rectangle in px; with `mask` too, what lies in both.
+        mask: a picture of the video's size, inside where it is brighter than middle grey.
+
+    Raises:
+        TrackingError: the rectangle leaves the picture; the mask is unreadable, of another size, or empty.
+    """
+    width, height = size
+    region = np.full((height, width), 255, np.uint8)
+    if mask is not None:
+        region = _read_mask(mask, size)
+    if roi is not None:
+        x, y, w, h = roi
+        if w <= 0 or h <= 0 or x < 0 or y < 0 or x + w > width or y + h > height:
+            raise TrackingError(
+                f"the region {x} {y} {w} {h} (x y width height) leaves the picture of {width}x{height} px"
+            )
+        inside = np.zeros_like(region)
+        inside[y : y + h, x : x + w] = 255
+        region &= inside
+    if not region.any():
+        where = f"{mask}" if roi is None else f"{mask} within the region {roi[0]} {roi[1]} {roi[2]} {roi[3]}"
+        raise TrackingError(f"the mask is empty: {where} is black; paint the surface to follow white")
+    return region
+
+
+def _read_mask(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
+    if not path.is_file():
+        raise TrackingError(f"no mask file {path}; check the path")
+    encoded = np.fromfile(path, np.uint8)
+    picture = cv2.imdecode(encoded, cv2.IMREAD_GRAYSCALE) if encoded.size else None
+    if picture is None:
+        raise TrackingError(f"the mask {path} is not a picture that can be read; save it as PNG")
+    found = (picture.shape[1], picture.shape[0])
+    if found != size:
+        raise TrackingError(
+            f"the mask {path} has {found[0]}x{found[1]} px, the video {size[0]}x{size[1]}; they must be equal"
+        )
+    return np.where(cast(NDArray[np.uint8], picture) > 127, 255, 0).astype(np.uint8)

@@ -1,0 +1,219 @@
+"""Tracked points of a whole sequence, and the truth some sequences come with, as .npz files."""
+
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking import TrackingError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Image points of F frames and P points; where not visible, `W` may hold anything.
+
+    Attributes:
+        W: (F, 2, P) image points, px.
+        visible: (F, P) bool.
+        K: (3, 3) camera intrinsics, if known.
+        S_gt: (K, 3, P) true shapes in camera axes (x right, y down, z forward), if known.
+        gt_frames: (K,) the frame each true shape belongs to, ascending; given together with S_gt.
+
+    Raises:
+        TrackingError: shapes that do not fit, or entries that are not finite.
+    """
+
+    W: Array
+    visible: NDArray[np.bool_]
+    K: Array | None = None
+    S_gt: Array | None = None
+    gt_frames: NDArray[np.int64] | None = None
+
+    def __post_init__(self) -> None:
+        if self.W.ndim != 3 or self.W.shape[1] != 2 or 0 in self.W.shape:
+            raise _wrong_shape("W", self.W, "(frames, 2, points)")
+        frames, _, points = self.W.shape
+        if self.visible.shape != (frames, points):
+            raise _wrong_shape(
+                "visible", self.visible, f"({frames}, {points}) as W has {frames} frames and {points} points"
+            )
+        bad = self.visible & ~np.isfinite(self.W).all(axis=1)
+        if bad.any():
+            f, p = np.argwhere(bad)[0]
+            raise TrackingError(
+                f"W has {int(bad.sum())} visible entries that are not finite (first: frame {f}, point {p}); "
+                "mark them as not visible"
+            )
+        _check_intrinsics(self.K)
+        if (self.S_gt is None) != (self.gt_frames is None):
+            raise TrackingError("S_gt and gt_frames belong together; only one of them is given")
+        if self.S_gt is not None and self.gt_frames is not None:
+            _check_truth(self.S_gt, self.gt_frames, points)
+            if self.gt_frames[-1] >= frames:
+                raise TrackingError(
+                    f"gt_frames goes to {self.gt_frames[-1]}, but W has only the frames 0 to {frames - 1}"
+                )
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read an .npz file: `W` and optionally `visible` (absent: all), `K`, `S_gt`, `gt_frames`.
+
+        Raises:
+            TrackingError: the file is missing, is no .npz, lacks `W`, or its arrays do not fit.
+        """
+        arrays = _read_npz(path)
+        if "W" not in arrays:
+            hint = "; with W_px it is a file of truth only, for --ground-truth" if "W_px" in arrays else ""
+            raise TrackingError(f"{path} has no array W (frames, 2, points), only {_names(arrays)}{hint}")
+        try:
+            W = _numbers("W", arrays)
+            visible = _flags("visible", arrays)
+            if visible is None:
+                visible = np.ones((W.shape[0], W.shape[-1]) if W.ndim == 3 else (0, 0), bool)
+            given = {name: _numbers(name, arrays) for name in ("K", "S_gt") if name in arrays}
+            return cls(W, visible, given.get("K"), given.get("S_gt"), _frame_numbers(arrays))
+        except TrackingError as error:
+            raise TrackingError(f"{path}: {error}") from None
+
+    def save(self, path: Path) -> None:
+        """Write an .npz file that `load` reads.
+
+        Raises:
+            TrackingError: the file cannot be written.
+        """
+        optional = {"K": self.K, "S_gt": self.S_gt, "gt_frames": self.gt_frames}
+        arrays: dict[str, Any] = {name: value for name, value in optional.items() if value is not None}
+        try:
+            with path.open("wb") as file:  # not by name: NumPy would add .npz to it
+                np.savez_compressed(file, W=self.W, visible=self.visible, **arrays)
+        except OSError as error:
+            raise TrackingError(f"cannot write the tracks to {path}: {error.strerror}") from None
+
+
+@dataclass(frozen=True)
+class Truth:
+    """True shapes of some frames, with the pixels their points are seen at.
+
+    Attributes:
+        W_px: (K, 2, P) pixel positions.
+        S: (K, 3, P) true shapes in camera axes (x right, y down, z forward), any unit.
+        frames: (K,) the frame each belongs to, ascending.
+        K: (3, 3) camera intrinsics, if known.
+    """
+
+    W_px: Array
+    S: Array
+    frames: NDArray[np.int64]
+    K: Array | None = None
+
+    def __post_init__(self) -> None:
+        if self.W_px.ndim != 3 or self.W_px.shape[1] != 2 or 0 in self.W_px.shape:
+            raise _wrong_shape("W_px", self.W_px, "(true frames, 2, points)")
+        _check_truth(self.S, self.frames, self.W_px.shape[2])
+        if self.W_px.shape[0] != self.S.shape[0]:
+            raise _wrong_shape(
+                "W_px", self.W_px, f"({self.S.shape[0]}, 2, {self.S.shape[2]}) as S_gt has that many shapes"
+            )
+        if not np.isfinite(self.W_px).all():
+            raise TrackingError("W_px has entries that are not finite")
+        _check_intrinsics(self.K)
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read an .npz file: `S_gt`, `gt_frames` and `W_px` (K, 2, P), or the `W` (F, 2, P) of a track file.
+
+        Raises:
+            TrackingError: the file is missing, is no .npz, lacks an array, or its arrays do not fit.
+        """
+        arrays = _read_npz(path)
+        needed = ("S_gt", "gt_frames") if "W" in arrays else ("S_gt", "gt_frames", "W_px")
+        missing = [name for name in needed if name not in arrays]
+        if missing:
+            raise TrackingError(
+                f"{path} has no array {', '.join(missing)}, only {_names(arrays)}; truth needs them"
+            )
+        if "W_px" not in arrays:
+            tracks = Tracks.load(path)
+            assert tracks.S_gt is not None
+            assert tracks.gt_frames is not None
+            return cls(tracks.W[tracks.gt_frames], tracks.S_gt, tracks.gt_frames, tracks.K)
+        try:
+            frames = _frame_numbers(arrays)
+            assert frames is not None
+            K = _numbers("K", arrays) if "K" in arrays else None
+            return cls(_numbers("W_px", arrays), _numbers("S_gt", arrays), frames, K)
+        except TrackingError as error:
+            raise TrackingError(f"{path}: {error}") from None
+
+
+def _read_npz(path: Path) -> dict[str, NDArray[Any]]:
+    if not path.is_file():
+        raise TrackingError(f"no file {path}; check the path")
+    try:
+        if not zipfile.is_zipfile(path):
+            raise TrackingError(f"{path} is not an .npz file; write it with numpy.savez")
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except TrackingError:
+        raise
+    except Exception as error:  # damaged archives raise a dozen different things, MemoryError among them
+        raise TrackingError(f"{path} is damaged or holds objects that are not arrays ({error})") from None
+
+
+def _names(arrays: Mapping[str, object]) -> str:
+    return ", ".join(sorted(arrays)) or "nothing"
+
+
+def _numbers(name: str, arrays: Mapping[str, NDArray[Any]]) -> Array:
+    array = arrays[name]
+    if array.dtype.kind not in "fiu":
+        raise TrackingError(f"{name} holds {array.dtype}, but numbers are needed")
+    return array.astype(np.float64)
+
+
+def _flags(name: str, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_] | None:
+    if name not in arrays:
+        return None
+    array = arrays[name]
+    if array.dtype.kind not in "biu":
+        raise TrackingError(f"{name} holds {array.dtype}, but true or false is needed")
+    return array.astype(bool)
+
+
+def _frame_numbers(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64] | None:
+    if "gt_frames" not in arrays:
+        return None
+    numbers = _numbers("gt_frames", arrays)
+    if not (np.isfinite(numbers).all() and np.all(numbers == np.round(numbers))):
+        raise TrackingError("gt_frames holds frame numbers that are not whole")
+    return numbers.astype(np.int64)
+
+
+def _check_intrinsics(K: Array | None) -> None:
+    if K is None:
+        return
+    if K.shape != (3, 3):
+        raise _wrong_shape("K", K, "(3, 3)")
+    if not (np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0):
+        raise TrackingError("K is no camera matrix; its focal lengths K[0, 0] and K[1, 1] must be positive")
+
+
+def _check_truth(S: Array, frames: NDArray[np.int64], points: int) -> None:
+    if S.ndim != 3 or S.shape[1:] != (3, points) or len(S) == 0:
+        raise _wrong_shape("S_gt", S, f"(true frames, 3, {points}) as there are {points} points")
+    if not np.isfinite(S).all():
+        raise TrackingError("S_gt has entries that are not finite")
+    if frames.shape != (len(S),):
+        raise _wrong_shape("gt_frames", frames, f"({len(S)},) as S_gt has {len(S)} shapes")
+    if frames[0] < 0 or np.any(np.diff(frames) <= 0):
+        raise TrackingError("gt_frames must ascend from 0 or later, each frame once")
+
+
+def _wrong_shape(name: str, array: NDArray[Any], asked: str) -> TrackingError:
+    return TrackingError(f"{name} has the shape {array.shape}, but {asked} is needed")

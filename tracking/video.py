@@ -1,0 +1,292 @@
+"""Frames with true time stamps from a file, an image pattern, a camera or a URL."""
+
+import os
+import re
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, Full, Queue
+from types import TracebackType
+from typing import Protocol, Self, cast
+
+# FFmpeg reads its level when the first file is opened; both would write past us to the terminal.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking import TrackingError
+
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # in case cv2 was imported before us
+
+Image = NDArray[np.uint8]
+
+DEFAULT_FPS = 30.0  # of sources that do not tell
+DECODE_AHEAD = 4  # frames waiting in the queue: enough to hide decoding, little memory
+BROKEN_FRAMES = 30  # so many unreadable frames in a row end the source
+AV1_FOURCC = "AV01"
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One picture of the source.
+
+    Attributes:
+        index: 0-based number of the frame in its source.
+        time_s: its time stamp in seconds.
+        image: (H, W, 3) uint8 BGR.
+    """
+
+    index: int
+    time_s: float
+    image: Image
+
+
+class _Capture(Protocol):
+    """What `Video` needs of a cv2.VideoCapture."""
+
+    def grab(self) -> bool: ...
+    def retrieve(self) -> tuple[bool, Image]: ...
+    def get(self, propId: int, /) -> float: ...
+    def release(self) -> None: ...
+
+
+class Video:
+    """An iterator of `Frame` over a video; a context manager that stops its decoding thread.
+
+    The first frame is decoded at once, so that everything that can be wrong with a source is said here.
+
+    Args:
+        source: a file, a printf pattern of images ("img%04d.png"), the index of a camera ("0") or a URL.
+        first: index of the first frame delivered.
+        stop: index of the first frame not delivered any more; None reads to the end.
+
+    Attributes:
+        size: (width, height) in px.
+        frame_count: announced number of frames that will be delivered, a hint only: containers lie, and
+            None where the source does not say (live sources).
+        fps: announced rate, a hint only.
+
+    Raises:
+        TrackingError: the source is missing, cannot be decoded, or has no frame in the asked range.
+    """
+
+    def __init__(self, source: str, first: int = 0, stop: int | None = None) -> None:
+        if first < 0 or (stop is not None and stop <= first):
+            raise TrackingError(
+                f"no frame in the range {first}:{'' if stop is None else stop}; ask for A:B with 0 <= A < B"
+            )
+        self.source = source
+        self._stop = stop
+        self._capture = _open(source)
+        self._index = 0  # of the next frame grabbed
+        self._time_s = -np.inf
+        fps = self._capture.get(cv2.CAP_PROP_FPS)
+        self.fps = fps if 0.5 < fps < 1000.0 else DEFAULT_FPS
+        announced = self._capture.get(cv2.CAP_PROP_FRAME_COUNT)
+        self._announced = int(announced) if 0 < announced < 2**31 else None
+        try:
+            self._skip_to(first)
+            frame = self._read()
+            if frame is None:
+                raise self._nothing_decoded()
+        except BaseException:
+            self._capture.release()
+            raise
+        self._first = frame
+        self.size = (frame.image.shape[1], frame.image.shape[0])
+        self.frame_count: int | None = None
+        if self._announced is not None:
+            end = self._announced if stop is None else min(stop, self._announced)
+            self.frame_count = max(end - frame.index, 1)
+        self._queue: Queue[Frame | BaseException | None] = Queue(DECODE_AHEAD)
+        self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[Frame]:
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._decode, name="decode", daemon=True)
+            self._thread.start()
+        while not self._closing.is_set():
+            try:
+                item = self._queue.get(timeout=0.1)
+            except Empty:
+                continue
+            if item is None:
+                self._put(None)  # a second iteration ends at once, too
+                return
+            if isinstance(item, BaseException):
+                raise item
+            yield item
+
+    def close(self) -> None:
+        """Stop decoding and release the source; iterating ends. May be called again."""
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._capture.release()
+
+    def _decode(self) -> None:
+        """Fill the queue until the end, an error, or `close`; None marks the end."""
+        frame: Frame | None = self._first
+        try:
+            while frame is not None and self._put(frame):
+                frame = self._read()
+            self._put(None)
+        except BaseException as error:  # handed to the thread that iterates
+            self._put(error)
+
+    def _put(self, item: Frame | BaseException | None) -> bool:
+        while not self._closing.is_set():
+            try:
+                self._queue.put(item, timeout=0.1)
+                return True
+            except Full:
+                continue
+        return False
+
+    def _skip_to(self, first: int) -> None:
+        # Not by seeking: containers miss the frame by up to a group of pictures.
+        while self._index < first:
+            if not self._grab():
+                if self._index == 0:
+                    raise self._nothing_decoded()
+                raise TrackingError(f"{self.source} ends at frame {self._index}; ask for frames before it")
+            self._index += 1
+
+    def _grab(self) -> bool:
+        """Go to the next frame that is whole, past broken ones; False at the end of the source."""
+        start = self._index
+        for _ in range(BROKEN_FRAMES):
+            if self._capture.grab():
+                return True
+            if self._announced is None or self._index + 1 >= self._announced:
+                break
+            self._index += 1
+        self._index = start
+        return False
+
+    def _read(self) -> Frame | None:
+        """The next frame that decodes, or None at the end of the source or of the asked range."""
+        for _ in range(BROKEN_FRAMES):
+            if (self._stop is not None and self._index >= self._stop) or not self._grab():
+                return None
+            ok, image = self._capture.retrieve()
+            if ok and image is not None and image.size:
+                return self._frame(_as_bgr(image))
+            self._index += 1
+        return None
+
+    def _frame(self, image: Image) -> Frame:
+        if hasattr(self, "size") and (image.shape[1], image.shape[0]) != self.size:
+            image = cast(Image, cv2.resize(image, self.size))  # a stream may change its resolution
+        time_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        if not np.isfinite(time_s) or time_s <= self._time_s or (time_s <= 0.0 and self._index > 0):
+            time_s = max(self._index / self.fps, self._time_s + 1e-3)
+        self._time_s = time_s
+        frame = Frame(self._index, time_s, image)
+        self._index += 1
+        return frame
+
+    def _nothing_decoded(self) -> TrackingError:
+        code = int(self._capture.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little", signed=True)
+        codec = code.decode("ascii", "replace").strip("\0 ")
+        if codec.upper() == AV1_FOURCC:
+            return TrackingError(
+                f"{self.source} is AV1 video, which OpenCV's decoder does not support; convert it: "
+                f"ffmpeg -i {self.source} -c:v libx264 -crf 18 converted.mp4"
+            )
+        named = f" (codec {codec})" if codec.isprintable() and codec else ""
+        return TrackingError(
+            f"{self.source} has no frame that can be decoded{named}; convert it to H.264 with ffmpeg"
+        )
+
+
+class _ImageFiles:
+    """The files of a printf pattern in the order of their numbers, which may start anywhere and have gaps."""
+
+    def __init__(self, pattern: str) -> None:
+        path = Path(pattern)
+        name = re.fullmatch(r"(.*?)%0?(\d*)d(.*)", path.name)
+        if name is None:
+            raise TrackingError(
+                f"{pattern}: give the number of the image once in the file's name, as img%04d.png"
+            )
+        before, _, after = name.groups()
+        numbered = re.compile(re.escape(before) + r"(\d+)" + re.escape(after))
+        found: list[tuple[int, Path]] = []
+        if path.parent.is_dir():
+            matches = ((numbered.fullmatch(file.name), file) for file in path.parent.iterdir())
+            found = [(int(m[1]), file) for m, file in matches if m and path.name % int(m[1]) == file.name]
+        if not found:
+            raise TrackingError(
+                f"no image file matches {pattern}; the number stands for the frame, as in img%04d.png"
+            )
+        self._files = [file for _, file in sorted(found)]
+        self._next = 0
+
+    def grab(self) -> bool:
+        self._next += 1
+        return self._next <= len(self._files)
+
+    def retrieve(self) -> tuple[bool, Image]:
+        encoded = np.fromfile(self._files[self._next - 1], np.uint8)
+        image = cv2.imdecode(encoded, cv2.IMREAD_COLOR) if encoded.size else None
+        return image is not None, cast(Image, image)
+
+    def get(self, propId: int, /) -> float:
+        return float(len(self._files)) if propId == cv2.CAP_PROP_FRAME_COUNT else 0.0
+
+    def release(self) -> None:
+        self._next = len(self._files)
+
+
+def _open(source: str) -> _Capture:
+    if re.fullmatch(r"\d+", source):
+        camera = cv2.VideoCapture(int(source))
+        if not camera.isOpened():
+            raise TrackingError(
+                f"camera {source} cannot be opened; is it connected, and free of other programs?"
+            )
+        return cast(_Capture, camera)
+    if "://" not in source:
+        path = Path(source)
+        if re.search(r"%0?\d*d", source) and not path.exists():
+            return _ImageFiles(source)
+        if path.is_dir():
+            raise TrackingError(
+                f"{source} is a folder; give the images in it by a pattern, as {source}/img%04d.png"
+            )
+        if not path.is_file():
+            raise TrackingError(f"no video file {source}; check the path")
+        if not os.access(path, os.R_OK):
+            raise TrackingError(f"{source} cannot be read: permission denied")
+    capture = cv2.VideoCapture(source)
+    if not capture.isOpened():
+        remedy = "check the address" if "://" in source else "it is not a video, or it is damaged or cut off"
+        raise TrackingError(f"{source} cannot be decoded; {remedy}")
+    return cast(_Capture, capture)
+
+
+def _as_bgr(image: Image) -> Image:
+    """The picture as (H, W, 3) uint8, whatever depth and channels the decoder gave."""
+    if image.dtype != np.uint8:
+        image = cast(
+            Image, cv2.convertScaleAbs(image, alpha=1.0 / 256.0 if image.dtype == np.uint16 else 1.0)
+        )
+    if image.ndim == 2 or image.shape[2] == 1:
+        return cast(Image, cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))
+    if image.shape[2] == 4:
+        return cast(Image, cv2.cvtColor(image, cv2.COLOR_BGRA2BGR))
+    return image
