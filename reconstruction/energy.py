@@ -48,7 +48,7 @@ class State:
     def moved(self, step: Array, rows: tuple[int, ...]) -> "State":
         """The state after a step (n, d) in the local parameters, with the given rows of Λ free."""
         Lambda = self.Lambda.copy()
-        Lambda[:, rows, :] += step[:, POSE:].reshape(len(self), len(rows), -1)
+        Lambda[:, rows, :] += step[:, POSE:].reshape(len(self), len(rows), Lambda.shape[2])
         q = quaternion_product(self.q, quaternion_exp(step[:, :3]))
         q /= np.linalg.norm(q, axis=1, keepdims=True)
         return State(q, self.t + step[:, 3:5], self.log_s + step[:, 5], Lambda)
