@@ -1,0 +1,101 @@
+"""The two large pictures on the page: a landscape and a city plan."""
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.demo.ink import (
+    BLACK,
+    INKS,
+    OCHRE,
+    PX_PER_MM,
+    RED,
+    SKY,
+    WHITE,
+    Box,
+    Image,
+    block,
+    disc,
+    made_up_word,
+    polygon,
+    polyline,
+    px,
+    write,
+)
+
+
+def _clouds(shape: tuple[int, int], rng: np.random.Generator) -> NDArray[np.float32]:
+    """Smooth noise of several octaves in 0…1, (h, w)."""
+    total = np.zeros(shape, np.float32)
+    for octave in range(1, 7):
+        coarse = rng.random((2**octave + 1, 2**octave + 2), np.float32)
+        smooth = cv2.resize(coarse, shape[::-1], interpolation=cv2.INTER_CUBIC)
+        total += np.asarray(smooth / 1.6**octave, np.float32)
+    low, high = float(total.min()), float(total.max())
+    return ((total - low) / (high - low)).astype(np.float32)
+
+
+def landscape(page: Image, area: Box, rng: np.random.Generator) -> None:
+    """A landscape: sky with clouds, a sun, ridges one behind the other, a lake with a boat."""
+    x, y, w, h = area
+    left, top, width, height = px(x, y, w, h)
+    down = np.linspace(0, 1, height, dtype=np.float32)[:, None, None]
+    sky = (1 - down) * np.array((190, 120, 60), np.float32) + down * np.array((150, 200, 250), np.float32)
+    cloud = np.clip(_clouds((height, width), rng) * 2.4 - 1.0, 0, 1)[..., None]
+    picture = (sky * (1 - cloud) + cloud * 245).astype(np.uint8)
+    cv2.circle(
+        picture,
+        (round(width * 0.73), round(height * 0.24)),
+        round(height * 0.11),
+        (90, 215, 255),
+        -1,
+        cv2.LINE_AA,
+    )
+    across = np.arange(width)
+    for ridge in range(5):
+        steps = np.cumsum(rng.normal(0, 1, 14 + 5 * ridge))
+        crest = np.interp(
+            across, np.linspace(0, width, len(steps)), steps - np.linspace(steps[0], steps[-1], len(steps))
+        )
+        crest = height * (0.36 + 0.12 * ridge) + crest * height * 0.032
+        shade = np.array((150, 110, 90)) * (1 - ridge / 6) + np.array((10, 26, 12))
+        ground = shade * (0.55 + 0.9 * _clouds((height, width), rng)[..., None])
+        below = (np.arange(height)[:, None] > crest)[..., None]
+        picture = np.where(below, np.clip(ground, 0, 255), picture).astype(np.uint8)
+    page[top : top + height, left : left + width] = picture
+    for _ in range(26):
+        fx, fy = x + w * rng.uniform(0.02, 0.96), y + h * rng.uniform(0.7, 0.97)
+        tall = rng.uniform(2.5, 6.5)
+        tree = np.array([(fx - tall / 3, fy), (fx, fy - tall), (fx + tall / 3, fy)])
+        polygon(page, tree, (24, int(rng.integers(44, 120)), int(rng.integers(10, 60))))
+    polygon(page, np.array([(38, 60), (44, 48), (51, 59), (45, 66)], float), RED)
+    polygon(page, np.array([(44, 48), (51, 59), (45, 66)], float), OCHRE)
+    polyline(page, np.array([(45, 66), (43, 71), (47, 75), (44, 81)], float), WHITE, 0.6)
+    block(page, area, BLACK, 0.5)
+
+
+def city_plan(page: Image, area: Box, rng: np.random.Generator) -> None:
+    """A city plan: cells around random places in pastel colours, with streets between, a river and names."""
+    x, y, w, h = area
+    left, top, width, height = px(x, y, w, h)
+    places = rng.uniform(0, 1, (64, 2)) * (width, height)
+    rows, columns = np.mgrid[0:height, 0:width].astype(np.float32)
+    squared = (columns[..., None] - places[:, 0]) ** 2 + (rows[..., None] - places[:, 1]) ** 2
+    nearest = np.partition(squared, 1, axis=-1)[..., :2]
+    street = np.sqrt(nearest[..., 1]) - np.sqrt(nearest[..., 0]) < 9
+    pastel = rng.integers(120, 250, (64, 3))
+    cells = np.where(street[..., None], 252, pastel[squared.argmin(axis=-1)]).astype(np.uint8)
+    page[top : top + height, left : left + width] = cells
+    along = np.linspace(0, 1, 40)
+    river = np.column_stack(
+        [x + 1.5 + (w - 3) * along, y + h * (0.62 + 0.16 * np.sin(5 * along) - 0.2 * along)]
+    )
+    polyline(page, river, SKY, 3.2)
+    named: list[NDArray[np.float64]] = []
+    for place in places / PX_PER_MM + (x, y):
+        room = all(abs(place[0] - other[0]) > 19 or abs(place[1] - other[1]) > 5 for other in named)
+        if room and x + 2 < place[0] < x + w - 18 and y + 4 < place[1] < y + h - 3:
+            named.append(place)
+            disc(page, place[0], place[1], float(rng.uniform(0.9, 1.7)), INKS[rng.integers(len(INKS))])
+            write(page, made_up_word(rng)[:7].title(), place[0] + 2.3, place[1] + 1, 2.4, BLACK, bold=True)
+    block(page, area, BLACK, 0.8)
