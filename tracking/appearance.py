@@ -1,0 +1,106 @@
+"""What the points looked like in the reference frame, and where that is now, to a fraction of a pixel."""
+
+from dataclasses import dataclass
+from typing import cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Patches = NDArray[np.float32]
+Indices = NDArray[np.int64]
+
+FLAT = 1e-3  # grey levels of contrast below which a patch has no appearance
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Where patches were found.
+
+    Attributes:
+        points_px: (n, 2) aligned positions.
+        score: (n,) normalised cross-correlation there, -1 to 1.
+    """
+
+    points_px: Array
+    score: Array
+
+
+class Appearance:
+    """Square patches around the points of one frame, compared regardless of gain and offset.
+
+    A patch is found again by inverse-compositional alignment (Baker & Matthews 2004, translation only): its
+    gradients and normal matrices are computed once, an iteration samples the new picture and multiplies.
+
+    Args:
+        image: (H, W) float32 picture, e.g. a level of a pyramid.
+        points_px: (P, 2) patch centres in that picture.
+        radius: patches have (2 radius + 1)² samples.
+    """
+
+    def __init__(self, image: Patches, points_px: Array, radius: int) -> None:
+        steps = np.arange(-radius, radius + 1, dtype=np.float32)
+        u, v = np.meshgrid(steps, steps)
+        self._grid = np.stack([u.ravel(), v.ravel(), np.ones(u.size, np.float32)])
+        upright = np.broadcast_to(np.eye(2), (len(points_px), 2, 2))
+        patches = _sample(image, points_px, upright, self._grid)
+        self._patches, contrast = _normalised(patches)
+        gradients = [
+            (
+                _sample(image, points_px + step, upright, self._grid)
+                - _sample(image, points_px - step, upright, self._grid)
+            )
+            / (2.0 * contrast)
+            for step in np.eye(2)
+        ]
+        # The part of the gradients that gain and offset cannot explain.
+        gradients = [g - g.mean(axis=1, keepdims=True) for g in gradients]
+        gradients = [g - _dot(g, self._patches)[:, None] * self._patches for g in gradients]
+        self._gradients = np.stack(gradients, axis=1)
+        normal = (self._gradients @ np.swapaxes(self._gradients, 1, 2)).astype(np.float64)
+        normal[:, (0, 1), (0, 1)] += 1e-3 * np.trace(normal, axis1=1, axis2=2)[:, None] + 1e-9
+        self._inverse = np.linalg.inv(normal)
+
+    def align(
+        self, image: Patches, points_px: Array, affine: Array, which: Indices, iterations: int
+    ) -> Alignment:
+        """Move the points `which` to where the picture looks most like their patches.
+
+        Args:
+            image: (H, W) float32 picture.
+            points_px: (n, 2) first guesses.
+            affine: (n, 2, 2) maps from the patch to the picture.
+            which: (n,) the points' indices.
+            iterations: steps taken; with 0 the guesses are only scored.
+        """
+        points = points_px.copy()
+        patches, gradients, inverse = self._patches[which], self._gradients[which], self._inverse[which]
+        for _ in range(iterations):
+            seen, _ = _normalised(_sample(image, points, affine, self._grid))
+            slope = np.einsum("nkm,nm->nk", gradients, seen - patches).astype(np.float64)
+            step = (inverse @ slope[:, :, None])[:, :, 0]
+            step /= np.maximum(1.0, np.linalg.norm(step, axis=1, keepdims=True) / 2.0)
+            points -= (affine @ step[:, :, None])[:, :, 0]
+        seen, _ = _normalised(_sample(image, points, affine, self._grid))
+        return Alignment(points, _dot(seen, patches).astype(np.float64))
+
+
+def _sample(image: Patches, centres: Array, affine: Array, grid: Patches) -> Patches:
+    """The picture (n, m) at the m grid points (u, v, 1) mapped by each affine map about its centre."""
+    if len(centres) == 0:
+        return np.empty((0, grid.shape[1]), np.float32)
+    maps = np.concatenate([affine, centres[:, :, None]], axis=2).astype(np.float32)
+    x, y = maps[:, 0] @ grid, maps[:, 1] @ grid
+    return cast(Patches, cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+
+
+def _normalised(patches: Patches) -> tuple[Patches, Patches]:
+    """Patches of zero mean and unit norm, and the norms (n, 1)."""
+    centred = patches - patches.mean(axis=1, keepdims=True)
+    norm = np.maximum(np.sqrt(_dot(centred, centred)), FLAT)[:, None]
+    return centred / norm, norm
+
+
+def _dot(a: Patches, b: Patches) -> Patches:
+    return cast(Patches, np.einsum("ij,ij->i", a, b))
