@@ -29,7 +29,7 @@ _SKIN = np.array(
     ],
     float,
 )
-_SLEEVE = np.array([(151, 452, 58, 152, 760, 76)], float)
+_SLEEVE = np.array([(151, 388, 50, 152, 760, 76)], float)
 _NAILS = ((99, 62, 99), (134, 34, 94), (170, 40, 88), (205, 78, 76))
 
 # frame; where the middle of the palm is, in pixels; turn of the arm in degrees, anticlockwise.

@@ -36,42 +36,55 @@ def _clouds(shape: tuple[int, int], rng: np.random.Generator) -> NDArray[np.floa
 
 
 def landscape(page: Image, area: Box, rng: np.random.Generator) -> None:
-    """A landscape: sky with clouds, a sun, ridges one behind the other, a lake with a boat."""
+    """A landscape: sky with clouds, a sun, ridges one behind the other, trees, houses and kites."""
     x, y, w, h = area
     left, top, width, height = px(x, y, w, h)
     down = np.linspace(0, 1, height, dtype=np.float32)[:, None, None]
     sky = (1 - down) * np.array((190, 120, 60), np.float32) + down * np.array((150, 200, 250), np.float32)
     cloud = np.clip(_clouds((height, width), rng) * 2.4 - 1.0, 0, 1)[..., None]
     picture = (sky * (1 - cloud) + cloud * 245).astype(np.uint8)
-    cv2.circle(
-        picture,
-        (round(width * 0.73), round(height * 0.24)),
-        round(height * 0.11),
-        (90, 215, 255),
-        -1,
-        cv2.LINE_AA,
-    )
+    sun = round(width * 0.73), round(height * 0.24)
+    cv2.circle(picture, sun, round(height * 0.11), (90, 215, 255), -1, cv2.LINE_AA)
     across = np.arange(width)
     for ridge in range(5):
         steps = np.cumsum(rng.normal(0, 1, 14 + 5 * ridge))
-        crest = np.interp(
-            across, np.linspace(0, width, len(steps)), steps - np.linspace(steps[0], steps[-1], len(steps))
-        )
+        steps -= np.linspace(steps[0], steps[-1], len(steps))
+        crest = np.interp(across, np.linspace(0, width, len(steps)), steps)
         crest = height * (0.36 + 0.12 * ridge) + crest * height * 0.032
-        shade = np.array((150, 110, 90)) * (1 - ridge / 6) + np.array((10, 26, 12))
-        ground = shade * (0.55 + 0.9 * _clouds((height, width), rng)[..., None])
+        shade = np.array((170, 124, 96)) * (1 - ridge / 6) + np.array((14, 44, 24))
+        ground = shade * (0.3 + 1.5 * _clouds((height, width), rng)[..., None])
         below = (np.arange(height)[:, None] > crest)[..., None]
         picture = np.where(below, np.clip(ground, 0, 255), picture).astype(np.uint8)
     page[top : top + height, left : left + width] = picture
-    for _ in range(26):
-        fx, fy = x + w * rng.uniform(0.02, 0.96), y + h * rng.uniform(0.7, 0.97)
-        tall = rng.uniform(2.5, 6.5)
-        tree = np.array([(fx - tall / 3, fy), (fx, fy - tall), (fx + tall / 3, fy)])
-        polygon(page, tree, (24, int(rng.integers(44, 120)), int(rng.integers(10, 60))))
-    polygon(page, np.array([(38, 60), (44, 48), (51, 59), (45, 66)], float), RED)
-    polygon(page, np.array([(44, 48), (51, 59), (45, 66)], float), OCHRE)
-    polyline(page, np.array([(45, 66), (43, 71), (47, 75), (44, 81)], float), WHITE, 0.6)
+    for _ in range(44):
+        foot = np.array((x + w * rng.uniform(0.02, 0.97), y + h * rng.uniform(0.56, 0.97)))
+        tall = rng.uniform(2.5, 7.0)
+        green = (24, int(rng.integers(40, 190)), int(rng.integers(10, 110)))
+        polygon(page, foot + tall * np.array([(-0.33, 0), (0, -1), (0.33, 0)]), green)
+    for _ in range(13):
+        left_mm, top_mm = x + w * rng.uniform(0.03, 0.92), y + h * rng.uniform(0.6, 0.92)
+        wide = rng.uniform(3.0, 5.5)
+        block(page, (left_mm, top_mm, wide, 3.0), WHITE if rng.random() < 0.6 else OCHRE)
+        block(page, (left_mm + wide * rng.uniform(0.2, 0.6), top_mm + 1.0, 1.0, 1.2), BLACK)
+        roof = np.array(
+            [(left_mm - 0.6, top_mm), (left_mm + wide / 2, top_mm - 2.6), (left_mm + wide + 0.6, top_mm)]
+        )
+        polygon(page, roof, RED if rng.random() < 0.7 else BLACK)
+    kites = ((33, 14, 6.5), (8, 6, 3.6), (14, 21, 3.0), (51, 8, 4.2), (58, 24, 3.4), (82, 26, 3.8))
+    for right, lower, size in kites:
+        _kite(page, np.array((x + right, y + lower)), size, rng)
     block(page, area, BLACK, 0.5)
+
+
+def _kite(page: Image, middle: NDArray[np.float64], size: float, rng: np.random.Generator) -> None:
+    """A kite of two colours with a zigzag tail, leaning at random."""
+    lean = rng.uniform(-0.5, 0.5)
+    turn = np.array([(np.cos(lean), np.sin(lean)), (-np.sin(lean), np.cos(lean))]) * size
+    tail = np.column_stack([rng.uniform(-0.35, 0.35, 5), np.linspace(1.3, 2.6, 5)])
+    polyline(page, middle + tail @ turn, WHITE, 0.5)
+    first, second = rng.permutation(len(INKS))[:2]
+    polygon(page, middle + np.array([(-0.9, 0), (0, -1.2), (0, 1.3)]) @ turn, INKS[first])
+    polygon(page, middle + np.array([(0.9, 0), (0, -1.2), (0, 1.3)]) @ turn, INKS[second])
 
 
 def city_plan(page: Image, area: Box, rng: np.random.Generator) -> None:
