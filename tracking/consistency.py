@@ -80,15 +80,26 @@ def _fit(
     """Weighted least squares of each neighbourhood about its centroid: maps, predictions, support."""
     w = weight[neighbours]
     support = w.sum(axis=1)
-    share = (w / np.maximum(support, 1e-9)[:, None])[:, None, :]
-    x, y = reference[neighbours], current[neighbours]
-    x_mean, y_mean = share @ x, share @ y
-    x, y = x - x_mean, y - y_mean
-    xw = np.swapaxes(x, 1, 2) * share
-    Sxx, Sxy = xw @ x, xw @ y
-    pull = STIFFNESS * np.trace(Sxx, axis1=1, axis2=2) + 1e-6
-    Sxx[:, (0, 1), (0, 1)] += pull[:, None]
-    Sxy += pull[:, None, None] * np.swapaxes(prior, 1, 2)
-    affine = np.swapaxes(np.linalg.solve(Sxx, Sxy), 1, 2)
-    offset = (reference - x_mean[:, 0])[:, :, None]
-    return affine, y_mean[:, 0] + (affine @ offset)[:, :, 0], support
+    w /= np.maximum(support, 1e-9)[:, None]
+    # By coordinate, not by 2x2 matrices: stacks of tiny products cost NumPy several times as much.
+    coordinates = [column[neighbours] for column in (*reference.T, *current.T)]
+    means = [_rows(w, c) for c in coordinates]
+    x, y, u, v = (c - mean[:, None] for c, mean in zip(coordinates, means, strict=True))
+    wx, wy = w * x, w * y
+    xx, xy, yy = _rows(wx, x), _rows(wx, y), _rows(wy, y)
+    pull = STIFFNESS * (xx + yy) + 1e-6
+    xx, yy = xx + pull, yy + pull
+    determinant = xx * yy - xy * xy
+    affine = np.empty_like(prior)
+    for row, moved in enumerate((u, v)):
+        mx = _rows(wx, moved) + pull * prior[:, row, 0]
+        my = _rows(wy, moved) + pull * prior[:, row, 1]
+        affine[:, row, 0] = (mx * yy - my * xy) / determinant
+        affine[:, row, 1] = (my * xx - mx * xy) / determinant
+    offset = reference - np.stack(means[:2], axis=1)
+    return affine, np.stack(means[2:], axis=1) + np.einsum("nij,nj->ni", affine, offset), support
+
+
+def _rows(a: Array, b: Array) -> Array:
+    product: Array = np.einsum("ij,ij->i", a, b)
+    return product
