@@ -59,15 +59,29 @@ def polyline(page: Image, points_mm: NDArray[np.float64], ink: Colour, line_mm: 
     cv2.polylines(page, [np.rint(points_mm * PX_PER_MM).astype(np.int32)], False, ink, thickness, cv2.LINE_AA)
 
 
-def write(page: Image, text: str, x: float, y: float, size: float, ink: Colour, bold: bool = False) -> float:
-    """Write with the base line at y and capitals `size` high; returns the width in mm."""
+def write(
+    page: Image,
+    text: str,
+    x: float,
+    y: float,
+    size: float,
+    ink: Colour,
+    bold: bool = False,
+    room: float = np.inf,
+) -> float:
+    """Write with the base line at y and about `size` high; returns the width in mm, at most `room`.
+
+    OpenCV 4 and 5 come with different fonts, so the width is known only here.
+    """
     font = cv2.FONT_HERSHEY_DUPLEX if bold else cv2.FONT_HERSHEY_SIMPLEX
     (_, height), _ = cv2.getTextSize("H", font, 4.0, 1)
     scale = 4.0 * size * PX_PER_MM / height
     thickness = max(1, round(size * PX_PER_MM / (6 if bold else 10)))
+    (width, _), _ = cv2.getTextSize(text, font, scale, thickness)
+    if width > room * PX_PER_MM:
+        return write(page, text, x, y, 0.98 * size * room * PX_PER_MM / width, ink, bold, room)
     left, bottom = px(x, y)
     cv2.putText(page, text, (left, bottom), font, scale, ink, thickness, cv2.LINE_AA)
-    (width, _), _ = cv2.getTextSize(text, font, scale, thickness)
     return float(width / PX_PER_MM)
 
 

@@ -68,7 +68,7 @@ def _column(
     x, y, w, h = area
     bottom = y + h
     if heading:
-        write(page, heading, x, y + 5.0, 4.2, ink, bold=True)
+        write(page, heading, x, y + 5.0, 4.2, ink, bold=True, room=w)
         y += 8.0
     size = float(rng.uniform(2.3, 2.8))
     while y + size + 1.0 < bottom:
@@ -85,7 +85,7 @@ def _column(
 
 def _masthead(page: Image) -> None:
     block(page, (8, 8, 281, 23), NAVY)
-    write(page, "THE FOLDED TIMES", 41, 25.5, 12.5, WHITE, bold=True)
+    write(page, "THE FOLDED TIMES", 41, 25.5, 12.5, WHITE, bold=True, room=134)
     disc(page, 24, 19.5, 9, OCHRE)
     polygon(page, np.array([(16, 23), (22, 12), (26, 19), (28, 16), (33, 23)], float), RED)
     disc(page, 24, 19.5, 9, WHITE, 0.8)
@@ -93,7 +93,7 @@ def _masthead(page: Image) -> None:
         slant = np.array([(0, 27), (5, 12 + 2 * index), (12, 15 - index), (8, 22 + index)], float)
         polygon(page, slant + np.array((176 + 12.5 * index, 0)), ink)
     block(page, (244, 11, 42, 17), WHITE)
-    write(page, "No. 2016", 247, 18, 4, RED, bold=True)
+    write(page, "No. 2016", 247, 18, 4, RED, bold=True, room=36)
     write(page, "one thin sheet", 247, 25, 3, BLACK)
     block(page, (8, 32, 281, 1.0), BLACK)
 
@@ -174,8 +174,8 @@ def _stamp(page: Image, area: Box, rng: np.random.Generator) -> None:
     """A coupon: an offer in large letters beside a square code of random modules."""
     x, y, w, _ = area
     block(page, area, RED)
-    write(page, "FREE", x + 3, y + 15, 9, WHITE, bold=True)
-    write(page, "kite today", x + 3, y + 24, 4, WHITE, bold=True)
+    write(page, "FREE", x + 3, y + 15, 9, WHITE, bold=True, room=26)
+    write(page, "kite today", x + 3, y + 24, 4, WHITE, bold=True, room=26)
     polygon(page, np.array([(x + 4, y + 38), (x + 12, y + 27), (x + 22, y + 33), (x + 14, y + 39)]), OCHRE)
     block(page, (x + w - 35, y + 4, 32, 34), WHITE)
     for row, column in np.argwhere(rng.random((14, 13)) < 0.5):
