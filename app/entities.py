@@ -1,0 +1,71 @@
+"""What a recording contains: the one list that the writer, the blueprint and every reader share.
+
+Timelines: `frame` (number of the frame in its source, from 0) and `time` (seconds of the video); what is
+static has neither. A frame that is estimated again has several rows: the last one counts. p vertices, r
+modes, m triangles, n edges; matrices are flattened row by row; components of ours (`modeshape.…`) are
+float64 unless said otherwise.
+
+Static:
+
+- `/`, `world`: ViewCoordinates RDF: x right, y down, z forward, as a camera sees.
+- `world/mesh`: Mesh3D triangle_indices (m, 3), vertex_texcoords (p, 2), albedo_texture (crop of the
+  first frame); Transform3D, which gives the first shape unit size at the origin of the 3-D view (readers
+  of the vertices ignore it).
+- `world/camera`: Pinhole with intrinsics and resolution, Transform3D; for perspective cameras only.
+- `model`: modeshape.Model with rest S̄ (3p), Upsilon Υ (rp), eigenvalues (r), Phi Φ (9), faces (3m) and
+  edges (2n) int64, strips int64 (see `wireframe`; −1 ends a strip), texture_px (2p) the vertices in the
+  first frame, texture_origin (2) px of the crop in it, size (2) of the picture, perspective bool,
+  focal_px, center_px (2).
+- `configuration`, `summary`: TextDocument for people; modeshape.Document with json and version for
+  programs.
+
+Every frame:
+
+- `world/camera/image`: EncodedImage (JPEG), or VideoFrameReference and, static, AssetVideo.
+- `world/camera/points/seen`: Points2D, observed px float32, in the order of the true entries of
+  `visible`.
+- `world/camera/points/lost`: Points2D, neither seen nor predicted; drawn where they were last seen.
+- `observation`: modeshape.Observation with visible (p) bool, phase (text).
+- `quality/visible`: Scalars, share of the points seen, 0 to 1.
+- `timing/<stage>`: Scalars, milliseconds.
+- `events`: TextLog, when something happens.
+
+Every frame with a shape:
+
+- `world/mesh`: Mesh3D vertex_positions (p, 3) float32, camera axes, pixels of the first frame.
+- `world/camera/wireframe`: LineStrips2D, the reprojected mesh in px: the vertices in the order of
+  `strips`.
+- `world/camera/points/predicted`: Points2D, not seen; drawn where the model says they are.
+- `estimate`: modeshape.Estimate with quaternion (4) w first, t (2) px, s, Lambda (3r), visible (p) bool.
+- `quality/error`: Scalars, RMS and median reprojection error, px.
+- `coefficients/alpha`, `beta`, `tau`: BarChart, a row Γ of Λ (r).
+- `coefficients/leading`: Scalars, the first entries of Γ_α, Γ_β, Γ_τ.
+"""
+
+APPLICATION = "modeshape"
+
+FRAME = "frame"
+TIME = "time"
+
+WORLD = "world"
+MESH = "world/mesh"
+CAMERA = "world/camera"
+IMAGE = "world/camera/image"
+WIREFRAME = "world/camera/wireframe"
+SEEN = "world/camera/points/seen"
+PREDICTED = "world/camera/points/predicted"
+LOST = "world/camera/points/lost"
+OBSERVATION = "observation"
+ESTIMATE = "estimate"
+MODEL = "model"
+ERROR = "quality/error"
+VISIBLE = "quality/visible"
+TIMING = "timing"
+COEFFICIENTS = "coefficients"
+LEADING = "coefficients/leading"
+EVENTS = "events"
+CONFIGURATION = "configuration"
+SUMMARY = "summary"
+
+ROWS = ("alpha", "beta", "tau")
+"""Rows of Λ: along the two axes of the main plane, and across it."""

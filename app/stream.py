@@ -1,0 +1,103 @@
+"""The channel a recording is written through: Rerun's stream to a file, to viewers, to both or to nothing."""
+
+import os
+from pathlib import Path
+
+# Read when Rerun is loaded: its notes about ordinary work stay off the terminal.
+os.environ.setdefault("RUST_LOG", "error")
+
+import rerun as rr
+
+from app import entities
+from app.blueprint import blueprint
+from app.errors import UsageError
+
+
+class Stream:
+    """Rerun's RecordingStream with our timelines, and its failures as `UsageError`.
+
+    Args:
+        path: the .rrd file, or None.
+        urls: viewers that listen.
+    """
+
+    def __init__(self, path: Path | None, urls: list[str]) -> None:
+        self._path = path
+        sinks: list[rr.FileSink | rr.GrpcSink] = [rr.GrpcSink(url) for url in dict.fromkeys(urls)]
+        if path is not None:
+            sinks.append(rr.FileSink(path))
+        self._stream = rr.RecordingStream(entities.APPLICATION) if sinks else None
+        if self._stream is not None:
+            self._stream.set_sinks(*sinks, default_blueprint=blueprint())
+            self._stream.set_log_time_enabled(False)
+            self._stream.set_log_tick_enabled(False)
+
+    @property
+    def open(self) -> bool:
+        """Whether anybody reads what is written."""
+        return self._stream is not None
+
+    def name(self, name: str) -> None:
+        """What viewers call the recording."""
+        if self._stream is not None:
+            self._stream.send_recording_name(name)
+
+    def at(self, index: int, time_s: float) -> None:
+        """Everything but static data belongs to this frame from now on."""
+        if self._stream is not None:
+            self._stream.set_time(entities.FRAME, sequence=index)
+            self._stream.set_time(entities.TIME, duration=time_s)
+
+    def log(self, entity: str, what: rr.AsComponents, *, static: bool = False) -> None:
+        """Write one of Rerun's archetypes."""
+        if self._stream is not None:
+            self._stream.log(entity, what, static=static)
+
+    def values(self, entity: str, archetype: str, *, static: bool = False, **components: object) -> None:
+        """Write components of our own, at full precision; viewers do not draw them, programs read them."""
+        named = rr.DynamicArchetype(f"{entities.APPLICATION}.{archetype}", components=components)
+        self.log(entity, named, static=static)
+
+    def flush(self) -> None:
+        """Wait until everything is on its way to the disk.
+
+        Raises:
+            UsageError: it could not be written.
+        """
+        if self._stream is None:
+            return
+        try:
+            self._stream.flush()
+        except RuntimeError as error:
+            remedy = "free some space or choose another place with --out"
+            raise UsageError(f"cannot write {self._path}: {error}; {remedy}") from error
+
+    def close(self) -> None:
+        """Complete the file; without it, `rerun rrd verify` refuses it.
+
+        Raises:
+            UsageError: it could not be written.
+        """
+        try:
+            self.flush()
+        finally:
+            if self._stream is not None:
+                self._stream.disconnect()
+                self._stream = None
+
+
+def claim(path: Path, *, overwrite: bool) -> None:
+    """Make sure that a file can be written, creating its folder, before anything is computed.
+
+    Raises:
+        UsageError: it exists and may not be replaced, or cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.open("ab" if overwrite else "xb").close()
+    except FileExistsError as error:
+        raise UsageError(
+            f"{path} exists: replace it with --overwrite, or choose another with --out"
+        ) from error
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror}; choose another place with --out") from error

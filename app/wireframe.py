@@ -1,0 +1,46 @@
+"""Edges of a mesh as few long strips, so that drawing every frame's wireframe stays cheap."""
+
+from collections import defaultdict
+
+import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+import rerun as rr
+from numpy.typing import NDArray
+
+Indices = NDArray[np.int64]
+
+STRIP = rr.components.LineStrip2DBatch([]).as_arrow_array().type
+
+
+def edge_strips(edges: Indices) -> list[Indices]:
+    """Strips of vertex indices that run along every edge (n, 2) exactly once.
+
+    A walk over unused edges that starts at a vertex of odd degree ends at another one, so half as many strips
+    as odd vertices, and a few closed ones, cover the mesh: about 1.1 vertices per edge instead of 2.
+    """
+    unused: defaultdict[int, set[int]] = defaultdict(set)
+    for a, b in edges.tolist():
+        unused[a].add(b)
+        unused[b].add(a)
+
+    def walk(vertex: int) -> Indices:
+        strip = [vertex]
+        while unused[vertex]:
+            following = unused[vertex].pop()
+            unused[following].remove(vertex)
+            strip.append(following)
+            vertex = following
+        return np.array(strip)
+
+    open_strips = [walk(vertex) for vertex in list(unused) if len(unused[vertex]) % 2]
+    closed_strips = [walk(vertex) for vertex in list(unused) if unused[vertex]]
+    return open_strips + closed_strips
+
+
+def line_strips(points_px: NDArray[np.float32], strips: list[Indices]) -> rr.LineStrips2D:
+    """Strips through points (p, 2)."""
+    order = np.concatenate(strips)
+    # Rerun would convert strip by strip, which takes milliseconds.
+    points = pa.FixedSizeListArray.from_arrays(pa.array(points_px[order].ravel()), type=STRIP.value_type)
+    offsets = pa.array(np.cumsum([0, *map(len, strips)]), pa.int32())
+    return rr.LineStrips2D.from_fields(strips=pa.ListArray.from_arrays(offsets, points, type=STRIP))
