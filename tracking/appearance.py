@@ -11,6 +11,7 @@ Array = NDArray[np.float64]
 Patches = NDArray[np.float32]
 Indices = NDArray[np.int64]
 
+MAX_STEP = 2.0  # patch pixels; beyond, the linear model of the patch does not hold
 FLAT = 1e-3  # grey levels of contrast below which a patch has no appearance
 
 
@@ -21,10 +22,12 @@ class Alignment:
     Attributes:
         points_px: (n, 2) aligned positions.
         score: (n,) normalised cross-correlation there, -1 to 1.
+        score_before: (n,) the same at the first guess.
     """
 
     points_px: Array
     score: Array
+    score_before: Array
 
 
 class Appearance:
@@ -76,14 +79,19 @@ class Appearance:
         """
         points = points_px.copy()
         patches, gradients, inverse = self._patches[which], self._gradients[which], self._inverse[which]
+        seen = self._seen(image, points, affine)
+        before = score = _dot(seen, patches).astype(np.float64)
         for _ in range(iterations):
-            seen, _ = _normalised(_sample(image, points, affine, self._grid))
             slope = np.einsum("nkm,nm->nk", gradients, seen - patches).astype(np.float64)
             step = (inverse @ slope[:, :, None])[:, :, 0]
-            step /= np.maximum(1.0, np.linalg.norm(step, axis=1, keepdims=True) / 2.0)
+            step /= np.maximum(1.0, np.linalg.norm(step, axis=1, keepdims=True) / MAX_STEP)
             points -= (affine @ step[:, :, None])[:, :, 0]
-        seen, _ = _normalised(_sample(image, points, affine, self._grid))
-        return Alignment(points, _dot(seen, patches).astype(np.float64))
+            seen = self._seen(image, points, affine)
+            score = _dot(seen, patches).astype(np.float64)
+        return Alignment(points, score, before)
+
+    def _seen(self, image: Patches, points: Array, affine: Array) -> Patches:
+        return _normalised(_sample(image, points, affine, self._grid))[0]
 
 
 def _sample(image: Patches, centres: Array, affine: Array, grid: Patches) -> Patches:

@@ -8,23 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.appearance import Appearance
-from tracking.consistency import LocalMotion, local_motion, nearest_neighbours
+from tracking.consistency import MIN_SUPPORT, LocalMotion, local_motion, nearest_neighbours
+from tracking.flow import follow, spread_order
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Image = NDArray[np.uint8]
 Picture = NDArray[np.float32]
 
-WINDOW = (15, 15)
-LEVELS = 3
-FORWARD_BACKWARD_PX = 1.0
 PATCH_RADIUS = 7
 BORDER_PX = 4.0  # nearer to the border a point counts as having left
 KEEP_SCORE = 0.5  # correlation with the reference below which a tracked point is given up
 CORRECT_SCORE = 0.8  # ... above which its drift is removed
-ACCEPT_SCORE = 0.75  # ... above which a lost point is taken up again
+RETRIEVE_SCORE = 0.75  # ... above which a lost point is taken up again
 CORRECT_PX = 2.0  # larger "drift" is another place that looks alike
-REACQUIRE_PX = 8.0  # how far from the prediction a lost point may be found
+RETRIEVE_PX = 8.0  # how far from where it is expected a lost point may be found
+REFINE_STEPS = 2
+RETRIEVE_STEPS = 3
 PREDICTION_WEIGHT = 0.2  # of a predicted neighbour against a seen one
 
 
@@ -53,6 +53,7 @@ class PointTracker:
         gray = cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)
         self._gray = cast(Image, gray)
         self._reference = points_px.astype(np.float64)
+        self._order = spread_order(self._reference)
         self._neighbours = nearest_neighbours(self._reference)
         fine, coarse = _pictures(self._gray)
         self._fine = Appearance(fine, self._reference, PATCH_RADIUS)
@@ -75,11 +76,8 @@ class PointTracker:
         points[~motion.consistent] = np.nan
         fine, coarse = _pictures(gray)
         points = self._refine(fine, points, motion)
-        if predicted_px is not None:
-            points = self._reacquire(fine, coarse, points, predicted_px, motion)
-        height, width = gray.shape
-        inside = (points >= BORDER_PX) & (points <= np.array([width, height]) - 1.0 - BORDER_PX)
-        points[~inside.all(axis=1)] = np.nan
+        points = self._retrieve(fine, coarse, points, self._expected(points, motion, predicted_px), motion)
+        points[~_inside(points, gray.shape)] = np.nan
         self._points = points
         self._affine = motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
@@ -87,19 +85,8 @@ class PointTracker:
     def _flow(self, gray: Image) -> Array:
         """The points seen in the last frame, by optical flow: (P, 2), NaN where lost."""
         points = np.full_like(self._points, np.nan)
-        seen = np.flatnonzero(np.isfinite(self._points[:, 0]))
-        if len(seen) == 0:  # OpenCV raises
-            return points
-        start = self._points[seen].astype(np.float32)
-        there, found, _ = cv2.calcOpticalFlowPyrLK(
-            self._gray, gray, start, start.copy(), winSize=WINDOW, maxLevel=LEVELS
-        )
-        back, returned, _ = cv2.calcOpticalFlowPyrLK(
-            gray, self._gray, there, there.copy(), winSize=WINDOW, maxLevel=LEVELS
-        )
-        good = (found[:, 0] > 0) & (returned[:, 0] > 0)
-        good &= np.linalg.norm(back - start, axis=1) < FORWARD_BACKWARD_PX
-        points[seen[good]] = there[good]
+        seen = self._order[np.isfinite(self._points[self._order, 0])]
+        points[seen] = follow(self._gray, gray, self._points[seen])
         return points
 
     def _motion(self, points: Array, predicted_px: Array | None) -> LocalMotion:
@@ -114,42 +101,62 @@ class PointTracker:
         """Remove the drift of tracked points; drop those that look different."""
         points = points.copy()
         seen = np.flatnonzero(np.isfinite(points[:, 0]))
-        affine = motion.affine[seen]
-        flow = self._fine.align(fine, points[seen], affine, seen, 0)
-        aligned = self._fine.align(fine, points[seen], affine, seen, 2)
-        moved = np.linalg.norm(aligned.points_px - points[seen], axis=1)
-        better = (aligned.score > np.maximum(flow.score, CORRECT_SCORE)) & (moved < CORRECT_PX)
-        points[seen[better]] = aligned.points_px[better]
-        points[seen[np.where(better, aligned.score, flow.score) < KEEP_SCORE]] = np.nan
+        found = self._fine.align(fine, points[seen], motion.affine[seen], seen, REFINE_STEPS)
+        moved = np.linalg.norm(found.points_px - points[seen], axis=1)
+        better = (found.score > np.maximum(found.score_before, CORRECT_SCORE)) & (moved < CORRECT_PX)
+        points[seen[better]] = found.points_px[better]
+        points[seen[~better & (found.score_before < KEEP_SCORE)]] = np.nan
         return points
 
-    def _reacquire(
-        self, fine: Picture, coarse: Picture, points: Array, predicted_px: Array, motion: LocalMotion
-    ) -> Array:
-        """Find lost points again near their prediction: looks right, and moves like the neighbours."""
-        lost = np.flatnonzero(np.isnan(points[:, 0]) & np.isfinite(predicted_px).all(axis=1))
-        expected = (predicted_px + self._correction(points, predicted_px))[lost]
-        affine = motion.affine[lost]
-        rough = self._coarse.align(coarse, expected / 2.0, affine, lost, 3).points_px * 2.0
-        found = self._fine.align(fine, rough, affine, lost, 3)
-        near = np.linalg.norm(found.points_px - expected, axis=1) < REACQUIRE_PX
-        good = near & (found.score > ACCEPT_SCORE)
-        points = points.copy()
-        points[lost[good]] = found.points_px[good]
-        agreed = self._motion(points, None).consistent
-        points[lost[~agreed[lost]]] = np.nan
-        return points
+    def _expected(self, points: Array, motion: LocalMotion, predicted_px: Array | None) -> Array:
+        """Where to look for points that are not tracked now: (P, 2), NaN for nowhere.
 
-    def _correction(self, points: Array, predicted_px: Array) -> Array:
+        Points seen in the last frame are looked for where their neighbours went, points lost before where the
+        model predicts, moved by what the prediction misses around them.
+        """
+        expected = np.full_like(points, np.nan)
+        just_now = np.isfinite(self._points[:, 0]) & (motion.support >= MIN_SUPPORT)
+        expected[just_now] = motion.fitted_px[just_now]
+        if predicted_px is not None:
+            before = ~just_now & np.isfinite(predicted_px).all(axis=1)
+            expected[before] = (predicted_px + self._miss(points, predicted_px))[before]
+        expected[np.isfinite(points[:, 0])] = np.nan
+        return expected
+
+    def _miss(self, points: Array, predicted_px: Array) -> Array:
         """How far the prediction misses around each point: (P, 2), from the neighbours that are seen."""
         miss = points - predicted_px
         known = np.isfinite(miss[:, 0])
         if not known.any():
             return np.zeros_like(points)
-        filled = np.where(known[:, None], miss, 0.0)
-        count = known[self._neighbours].sum(axis=1)[:, None]
-        local = filled[self._neighbours].sum(axis=1) / np.maximum(count, 1)
-        return np.where(count > 0, local, np.median(miss[known], axis=0))
+        seen = known[self._neighbours]
+        local = np.where(seen[:, :, None], miss[self._neighbours], 0.0).sum(axis=1)
+        count = seen.sum(axis=1)[:, None]
+        return np.where(count > 0, local / np.maximum(count, 1), np.median(miss[known], axis=0))
+
+    def _retrieve(
+        self, fine: Picture, coarse: Picture, points: Array, expected: Array, motion: LocalMotion
+    ) -> Array:
+        """Take up points near where they are expected: they look right and move like their neighbours."""
+        sought = np.flatnonzero(_inside(expected, fine.shape))
+        if len(sought) == 0:
+            return points
+        affine = motion.affine[sought]
+        rough = self._coarse.align(coarse, expected[sought] / 2.0, affine, sought, RETRIEVE_STEPS)
+        found = self._fine.align(fine, 2.0 * rough.points_px, affine, sought, RETRIEVE_STEPS)
+        near = np.linalg.norm(found.points_px - expected[sought], axis=1) < RETRIEVE_PX
+        good = near & (found.score > RETRIEVE_SCORE)
+        points = points.copy()
+        points[sought[good]] = found.points_px[good]
+        agreed = self._motion(points, None).consistent
+        points[sought[~agreed[sought]]] = np.nan
+        return points
+
+
+def _inside(points: Array, shape: tuple[int, ...]) -> Flags:
+    """Which points (n, 2) are in the picture, away from its border; NaN is not."""
+    limit = np.array([shape[1], shape[0]]) - 1.0 - BORDER_PX
+    return np.all((points >= BORDER_PX) & (points <= limit), axis=1)
 
 
 def _pictures(gray: Image) -> tuple[Picture, Picture]:
