@@ -10,36 +10,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError
+from reconstruction.rigid import RigidMotion
 
 Array = NDArray[np.float64]
+
+STEADY_SCALE = 0.3  # weight of "the scale stays the same" against "the axes are orthogonal and equally long"
 
 
 @dataclass(frozen=True)
 class Factorization:
-    """A rigid shape and its scaled-orthographic views.
+    """A rigid shape in the axes and pixels of the first frame, and how far to trust it.
 
     Attributes:
-        shape: (3, p) centred, pixels of the first frame.
-        R: (F, 3, 3) rotations.
-        s: (F,) scales, 1 in the first frame.
-        t: (F, 2) translations, px.
+        motion: the shape and its scaled-orthographic views.
         singular_values: (4,) of the centred, completed observations: the fourth is what a rigid shape leaves unexplained.
         rms_px: reprojection error of the affine fit.
         metric_condition: smallest over largest eigenvalue of L, <= 0 where no real camera explains the views.
     """
 
-    shape: Array
-    R: Array
-    s: Array
-    t: Array
+    motion: RigidMotion
     singular_values: Array
     rms_px: float
     metric_condition: float
-
-    @property
-    def turn_degrees(self) -> float:
-        """Largest angle between the viewing directions of two frames."""
-        return view_turn_degrees(self.R)
 
 
 def view_turn_degrees(R: Array) -> float:
@@ -69,8 +61,7 @@ def factorize(W: Array, visible: NDArray[np.bool_]) -> Factorization:
     A, S = A @ Q, np.linalg.solve(Q, S)
     s = np.sqrt((A**2).sum(axis=(1, 2)) / 2)
     R = rotations_from_rows(A)
-    # World axes of the first frame, whose pixels are the unit.
-    return Factorization(R[0] @ S * s[0], R @ R[0].T, s / s[0], t, singular, rms, condition)
+    return Factorization(RigidMotion(S, R, s, t).in_first_frame(), singular, rms, condition)
 
 
 def affine_structure(W: Array, visible: NDArray[np.bool_], sweeps: int = 100) -> tuple[Array, Array, Array]:
@@ -123,9 +114,11 @@ def metric_upgrade(A: Array) -> tuple[Array, float]:
     def form(a: Array, b: Array) -> Array:
         return np.asarray((a[:, i] * b[:, j] + a[:, j] * b[:, i]) * np.where(i == j, 0.5, 1.0))
 
-    equations = np.concatenate([form(x, x) - form(y, y), form(x, y)])
-    size = np.linalg.norm(np.concatenate([form(x, x) + form(y, y)]), axis=1)
-    equations /= np.concatenate([size, size])[:, None]
+    length = form(x, x) + form(y, y)
+    size = np.linalg.norm(length, axis=1).mean()
+    # Between neighbouring frames a camera hardly zooms: without this, few or noisy views let the scale explain a turn.
+    steady = STEADY_SCALE * (length - length.mean(axis=0)) / size
+    equations = np.concatenate([(form(x, x) - form(y, y)) / size, 2 * form(x, y) / size, steady])
     entries = np.linalg.svd(equations)[2][-1]
     L = np.zeros((3, 3))
     L[i, j] = L[j, i] = entries

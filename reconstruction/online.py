@@ -1,37 +1,273 @@
-"""The on-line estimator: one observation in, the shapes it settles out."""
+"""The on-line estimator: one observation in, the shapes it settles out (paper §5)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Literal
 
-from numpy.typing import NDArray
 import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction import ReconstructionError, rest_shape
+from reconstruction.camera import Camera, quaternion_exp, quaternion_from_rotation, quaternion_product
+from reconstruction.energy import Energy, State, evaluate, join
+from reconstruction.mesh import Mesh, mesh_from_faces, triangulate
+from reconstruction.model import Model, ShapeEstimate
+from reconstruction.modes import Metric, modal_basis, principal_axes
+from reconstruction.rest_shape import RestShape
+from reconstruction.rigid import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE, adjust_poses, pose_energy
+from reconstruction.statistics import Statistics, stack
+from reconstruction.window import Solver, minimise
 
 Array = NDArray[np.float64]
+Visibility = NDArray[np.bool_]
+
+Deformation = Literal["auto", "bending", "stretching", "general", "inextensible"]
+ROWS: dict[str, tuple[int, ...]] = {
+    "bending": (2,),
+    "stretching": (0, 1),
+    "general": (0, 1, 2),
+    "inextensible": (0, 1, 2),
+}
+BOOTSTRAP_SCHEDULE = (10, 15, 20, 30, 45, 60)  # frames after which a rigid shape is looked for; the last decides
+FEWEST_POINTS = 4
+
+
+class Phase(Enum):
+    """What the estimator is doing."""
+
+    BOOTSTRAP = "bootstrap"
+    TRACKING = "tracking"
+    LOST = "lost"
 
 
 @dataclass(frozen=True)
-class ShapeEstimate:
-    """One frame's pose and shape: S = R(S̄ + ΦΛΥ) moved in front of the camera (Eq. 3, 8).
+class Settings:
+    """How to reconstruct.
 
     Attributes:
-        frame: index in the order of observation.
-        quaternion: (4,) of R, w first.
-        R: (3, 3) rotation.
-        t: (2,) image translation, px: where the shape's origin is seen, relative to the principal point.
-        s: scale; the origin's depth is focal/s.
-        Lambda: (3, r) coefficients Γ_α, Γ_β, Γ_τ, px.
-        shape: (3, p) deformed shape in camera axes (x right, y down, z forward), pixels of the first frame.
-        projection_px: (p, 2) the shape seen by the camera.
-        residual_px: (p,) distance to the observation, NaN where not visible.
-        visible: (p,) h^f.
+        rest_shape: auto, rigid or plane; `given` overrides it.
+        bootstrap_frames: frames the rest shape comes from; None decides from the evidence.
+        modes: r.
+        metric: dissimilarity the modes come from.
+        deformation: constraint on Λ (§3.4).
+        window: frames 𝒲 adjusted together.
+        energy: anchored (tied to the past, pulled to rest) or the paper's §5 as printed.
     """
 
-    frame: int
-    quaternion: Array
-    R: Array
-    t: Array
-    s: float
-    Lambda: Array
-    shape: Array
-    projection_px: Array
-    residual_px: Array
-    visible: NDArray[np.bool_]
+    rest_shape: Literal["auto", "rigid", "plane"] = "auto"
+    bootstrap_frames: int | None = None
+    modes: int = 20
+    metric: Metric = "euclidean"
+    deformation: Deformation = "auto"
+    window: int = 5
+    energy: Literal["anchored", "paper"] = "anchored"
+
+
+class Reconstruction:
+    """From observations to shapes, frame by frame: bootstrap first, then a sliding window.
+
+    Args:
+        camera: the camera; the paper's energy needs an orthographic one.
+        settings: how to reconstruct.
+        given: a rest shape (3, p) from elsewhere, with its mesh if it has one.
+    """
+
+    def __init__(
+        self, camera: Camera, settings: Settings, given: RestShape | None = None, mesh: Mesh | None = None
+    ) -> None:
+        if settings.energy == "paper" and camera.perspective:
+            raise ReconstructionError("--energy paper is orthographic: use it with --camera orthographic")
+        self.camera, self.settings = camera, settings
+        self.rest = given
+        self._mesh = mesh
+        self.window: SlidingWindow | None = None
+        self._waiting: list[tuple[Array, Visibility]] = []
+
+    @property
+    def phase(self) -> Phase:
+        """Bootstrapping until there is a rest shape, tracking afterwards."""
+        return Phase.BOOTSTRAP if self.window is None else Phase.TRACKING
+
+    @property
+    def model(self) -> Model:
+        """The rest shape with its modes; there once the bootstrap is over."""
+        if self.window is None:
+            raise ReconstructionError("there is no rest shape yet: the bootstrap is not over")
+        return self.window.model
+
+    def update(self, W: Array, visible: Visibility) -> list[ShapeEstimate]:
+        """Take one frame's points (2, p) px with visibility (p,); returns the shapes now known, oldest first.
+
+        Raises:
+            ReconstructionError: no rest shape can be had from the frames so far.
+        """
+        if self.window is not None:
+            return [self.window.advance(W, visible)]
+        self._waiting.append((W, visible))
+        n, wanted = len(self._waiting), self.settings.bootstrap_frames
+        if self.rest is not None:
+            return self._start(self.rest)
+        if wanted is None:
+            if n in BOOTSTRAP_SCHEDULE:
+                return self._decide(last=n == BOOTSTRAP_SCHEDULE[-1])
+        elif n >= wanted:
+            return self._decide(last=True)
+        return []
+
+    def finish(self) -> list[ShapeEstimate]:
+        """No more frames: settle for what the bootstrap has; returns the shapes of its frames."""
+        return self._decide(last=True) if self.window is None and self._waiting else []
+
+    def _decide(self, last: bool) -> list[ShapeEstimate]:
+        W = np.stack([w for w, _ in self._waiting])
+        visible = np.stack([v for _, v in self._waiting])
+        kind = self.settings.rest_shape
+        if kind == "plane":
+            return self._start(rest_shape.plane(W, visible, self.camera))
+        if kind == "rigid" and self.settings.bootstrap_frames is not None:
+            return self._start(rest_shape.rigid(W, visible, self.camera))
+        doubt = "there are too few frames for a rigid shape"
+        if len(W) >= BOOTSTRAP_SCHEDULE[0]:
+            doubt = rest_shape.weigh(W, visible).doubt
+            if not doubt:
+                return self._start(rest_shape.rigid(W, visible, self.camera))
+        if not last:
+            return []
+        if kind == "rigid":
+            raise ReconstructionError(
+                f"cannot recover a rest shape: {doubt}; give one with --rest-shape plane or --rest-shape mesh.obj"
+            )
+        flat = rest_shape.plane(W, visible, self.camera)
+        return self._start(replace(flat, note=f"{flat.note} (no rigid shape: {doubt})"))
+
+    def _start(self, rest: RestShape) -> list[ShapeEstimate]:
+        self.rest = rest
+        model = build_model(rest, self.camera, self.settings, self._mesh)
+        energy = build_energy(model, rest, self.camera, self.settings)
+        self.window = SlidingWindow(model, energy, self.settings.window, rest)
+        waiting, self._waiting = self._waiting, []
+        return [self.window.advance(W, visible) for W, visible in waiting]
+
+
+def build_model(rest: RestShape, camera: Camera, settings: Settings, mesh: Mesh | None) -> Model:
+    """Mesh and modes of a rest shape.
+
+    Raises:
+        ReconstructionError: more modes than the points carry.
+    """
+    shape = rest.motion.shape
+    if mesh is None:
+        mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
+        x, y = (rest.motion.R[0] @ shape)[:2]
+        a, b, c = mesh.faces.T
+        area = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a])
+        if area.sum() > 0:  # y points down: outward normals face the camera when the image winds the other way
+            mesh = mesh_from_faces(mesh.faces[:, ::-1])
+    return Model(modal_basis(shape, mesh, settings.modes, settings.metric), mesh, camera)
+
+
+def build_energy(model: Model, rest: RestShape, camera: Camera, settings: Settings) -> Energy:
+    """The energy that the settings name (paper §5, §3.4)."""
+    deformation = settings.deformation
+    if deformation == "auto":
+        deformation = "inextensible" if rest.flat else "general"
+    rows = ROWS[deformation]
+    if settings.energy == "paper":
+        return Energy(rows=rows, rest=0.0, deformation=1e-3, free_scale=False, tied=False)
+    scale = PERSPECTIVE_SCALE if camera.perspective else ORTHOGRAPHIC_SCALE
+    if deformation == "inextensible":
+        edges = model.coarse_edges()
+        return Energy(
+            rotation=1e-4, scale=scale, deformation=1e-3, rest=1e-3, inextensibility=3.0, rows=rows, edges=edges
+        )
+    return Energy(rotation=1e-4, scale=scale, deformation=1e-2, rest=1e-2, rows=rows)
+
+
+class SlidingWindow:
+    """Bundle adjustment over the last frames; one public verb.
+
+    Attributes:
+        model: the rest shape and its modes.
+        state: the window's frames.
+    """
+
+    def __init__(self, model: Model, energy: Energy, length: int, rest: RestShape) -> None:
+        self.model, self.energy, self.length, self.rest = model, energy, length, rest
+        self.state: State | None = None
+        self.before: State | None = None
+        self._data: list[Statistics] = []
+        self._frame = -1
+
+    def advance(self, W: Array, visible: Visibility) -> ShapeEstimate:
+        """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape."""
+        self._frame += 1
+        weights = visible.astype(np.float64)
+        self._data.append(self.model.statistics(W, weights))
+        newest = self._starting_state(W, visible)
+        window = newest if self.state is None else join([self.state, newest])
+        if len(window) > self.length:
+            self.before, window = window[:1], window[1:]
+            self._data.pop(0)
+        window = minimise(self.energy, stack(self._data), window, self.before, Solver()).state
+        robust = robust_weights(self.model.residuals(W, window), visible)
+        self._data[-1] = self.model.statistics(W, robust)
+        self.state = minimise(self.energy, stack(self._data), window, self.before, Solver()).state
+        return self.model.estimate(self._frame, W, visible, self.state)
+
+    def _starting_state(self, W: Array, visible: Visibility) -> State:
+        """Where the newest frame starts: the best of the last frame, constant velocity and the bootstrap's pose."""
+        starts = []
+        if self.state is not None:
+            last = self.state[-1:]
+            starts.append(last)
+            if len(self.state) > 1:
+                starts.append(extrapolated(self.state[-2:-1], last))
+        if self.state is None:
+            starts.append(self._first_state(W, visible))
+        scores = [evaluate(self.energy, self._data[-1], start, self.state and self.state[-1:])[0] for start in starts]
+        return starts[int(np.argmin(scores))]
+
+    def _first_state(self, W: Array, visible: Visibility) -> State:
+        """Pose of the first frame with nothing deformed, from tilted hypotheses: a frontal flat sheet is a saddle."""
+        motion, model = self.rest.motion, self.model
+        r = model.basis.Upsilon.shape[0]
+        energy = pose_energy(model.camera)
+        data = model.rigid_statistics(W, visible.astype(np.float64))
+        seen = W[:, visible] - model.camera.center_px[:, None]
+        flat_size = np.sqrt(np.var(motion.shape[:, visible], axis=1)[:2].sum())
+        log_s = float(np.log(np.sqrt(np.var(seen, axis=1).sum()) / flat_size))
+        t = seen.mean(axis=1) / model.radius
+        best = None
+        for tilt in (np.zeros(3), *(0.3 * rest_shape.tilt_axes())):
+            q = quaternion_product(quaternion_exp(tilt), quaternion_from_rotation(motion.R[0] @ model.basis.Phi))
+            start = State(q[None], t[None], np.array([log_s]), np.zeros((1, 3, 0)))
+            solution = minimise(energy, data, start, None, Solver())
+            if best is None or solution.value[0] < best.value[0] * (1 - 1e-6):
+                best = solution
+        assert best is not None
+        return replace(best.state, Lambda=np.zeros((1, 3, r)))
+
+
+def extrapolated(earlier: State, last: State) -> State:
+    """One frame further at constant velocity."""
+    conjugate = earlier.q * np.array([1.0, -1.0, -1.0, -1.0])
+    turned = quaternion_product(last.q, quaternion_product(conjugate, last.q))
+    return State(
+        turned / np.linalg.norm(turned, axis=1, keepdims=True),
+        2 * last.t - earlier.t,
+        2 * last.log_s - earlier.log_s,
+        2 * last.Lambda - earlier.Lambda,
+    )
+
+
+ROBUST_SIGMAS = 3.0
+
+
+def robust_weights(residuals: Array, visible: Visibility) -> Array:
+    """Weights (p,) that let points far outside the spread of the residuals (2, p) px count little (Geman-McClure)."""
+    distance = np.linalg.norm(np.where(visible, residuals, 0.0), axis=0)
+    if visible.sum() < FEWEST_POINTS:
+        return visible.astype(np.float64)
+    sigma = np.median(distance[visible]) / 1.1774  # median of a Rayleigh distribution
+    excess = np.maximum(distance / max(ROBUST_SIGMAS * sigma, 1e-9), 1.0)
+    return np.where(visible, excess**-4.0, 0.0)

@@ -1,0 +1,265 @@
+"""The rest shape S̄ from the first frames: rigid, a flat sheet, or neither, decided by the evidence (paper §4)."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from reconstruction import ReconstructionError
+from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
+from reconstruction.factorization import Factorization, affine_structure, factorize, view_turn_degrees
+from reconstruction.mesh import farthest_points
+from reconstruction.rigid import RigidMotion, adjust_poses, bundle_adjust, pose_energy, solve_points
+
+Array = NDArray[np.float64]
+Visibility = NDArray[np.bool_]
+Kind = Literal["rigid", "plane", "mesh", "truth"]
+
+TURN_DEGREES = 10.0  # less turn than this and depth drowns in noise
+RELIEF_OVER_NOISE = 3.0  # third over fourth singular value of the observations
+HALVES_AGREE = 0.10  # relative difference of the shapes of even and odd frames
+JUDGING_POINTS = 150  # well-spread points are enough to decide on
+TILT_DEGREES = 25.0  # tilts a flat sheet is started from
+TILT_GAIN = 0.7  # a tilt is believed when it lowers the reprojection error below this share of the frontal one's
+STILL_PX = 0.5  # apparent motion, beyond that of a similarity, that is not noise
+
+
+@dataclass(frozen=True)
+class RestShape:
+    """S̄ with how it was seen in the frames it came from.
+
+    Attributes:
+        kind: where it came from.
+        motion: shape (3, p), and poses of the bootstrap frames; one frame or more.
+        note: the evidence in words, for the log.
+        flat: whether the shape has no relief.
+    """
+
+    kind: Kind
+    motion: RigidMotion
+    note: str
+    flat: bool
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the first frames say about a rigid shape.
+
+    Attributes:
+        factorization: of the judging points.
+        turn_degrees: rotation covered.
+        relief: third over fourth singular value.
+        disagreement: relative difference of the shapes of even and odd frames.
+        doubt: why a rigid shape is not to be trusted; empty if it is.
+    """
+
+    factorization: Factorization
+    turn_degrees: float
+    relief: float
+    disagreement: float
+    doubt: str
+
+
+def weigh(W: Array, visible: Visibility) -> Evidence:
+    """Check a rigid shape of observations (F, 2, p) px against itself.
+
+    Raises:
+        ReconstructionError: too few frames or points to factorise.
+    """
+    chosen = judging_points(W, visible)
+    W, visible = W[:, :, chosen], visible[:, chosen]
+    result = factorize(W, visible)
+    moved = apparent_change(W, visible)
+    turn = view_turn_degrees(result.motion.R) if moved > STILL_PX else foreshortening_degrees(W, visible)
+    relief = float(result.singular_values[2] / max(result.singular_values[3], 1e-12))
+    disagreement = halves_disagreement(W, visible)
+    doubt = ""
+    if turn < TURN_DEGREES:
+        doubt = f"the object turned {turn:.1f}° in {len(W)} frames, about {TURN_DEGREES:.0f}° are needed"
+    elif result.metric_condition <= 0:
+        doubt = f"no rigid shape explains the motion in {len(W)} frames: the object deforms, or hardly turns"
+    elif relief < RELIEF_OVER_NOISE:
+        doubt = f"the object shows no relief above the noise in {len(W)} frames (ratio {relief:.1f})"
+    elif disagreement > HALVES_AGREE:
+        doubt = f"even and odd frames of the first {len(W)} give shapes that differ by {disagreement:.0%}"
+    return Evidence(result, turn, relief, disagreement, doubt)
+
+
+def rigid(W: Array, visible: Visibility, camera: Camera) -> RestShape:
+    """S̄ by factorisation and rigid bundle adjustment of observations (F, 2, p) px (Tomasi & Kanade 1992).
+
+    Raises:
+        ReconstructionError: the object turned too little for its depth to show, or too few frames or points.
+    """
+    chosen = judging_points(W, visible)
+    turned = foreshortening_degrees(W[:, :, chosen], visible[:, chosen])
+    if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL_PX:
+        raise ReconstructionError(
+            f"cannot recover a rest shape: the object turned {turned:.1f}° in {len(W)} frames, about "
+            f"{TURN_DEGREES:.0f}° are needed; give one with --rest-shape plane or --rest-shape mesh.obj"
+        )
+    start = factorize_often_seen(W, visible)
+    start = replace(start, t=start.t - camera.center_px)
+    starts = [start, start.mirrored()] if camera.perspective else [start]
+    motion, rms = min((bundle_adjust(W, visible, s, camera) for s in starts), key=lambda found: found[1])
+    motion = motion.in_first_frame()
+    turn = view_turn_degrees(motion.R)
+    note = f"rigid shape from {len(W)} frames, turned {turn:.0f}°, reprojection error {rms:.2f} px"
+    return RestShape("rigid", motion, note, flat=False)
+
+
+def factorize_often_seen(W: Array, visible: Visibility) -> RigidMotion:
+    """Factorise the points seen in enough frames; the others start at their image and their neighbours' depth.
+
+    Raises:
+        ReconstructionError: too few frames or points.
+    """
+    often = visible.sum(axis=0) >= max(3, 0.2 * len(W))
+    if often.sum() < 4:
+        raise ReconstructionError("cannot recover a rest shape: fewer than 4 points stay visible; give --rest-shape plane")
+    motion = factorize(W[:, :, often], visible[:, often]).motion
+    image = first_image(W, visible)
+    shape = np.zeros((3, W.shape[2]))
+    shape[:2] = image - motion.t[0][:, None]
+    shape[:, often] = motion.shape
+    if not often.all():
+        nearest = cKDTree(image[:, often].T).query(image[:, ~often].T, k=min(4, int(often.sum())))[1]
+        shape[2, ~often] = motion.shape[2][nearest].mean(axis=-1)
+    return replace(motion, shape=shape)
+
+
+def plane(W: Array, visible: Visibility, camera: Camera) -> RestShape:
+    """A flat sheet: tilted as the first frames say, frontal where they do not say.
+
+    Raises:
+        ReconstructionError: fewer than 4 points visible in a frame.
+    """
+    if visible.sum(axis=1).min() < 4:
+        raise ReconstructionError("cannot recover a rest shape: fewer than 4 points are visible")
+    first = first_image(W, visible)
+    frontal = sheet(first, np.eye(3), camera)
+    chosen = judging_points(W, visible)
+    if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL_PX or len(W) < 3:
+        return RestShape("plane", frontal, "flat sheet facing the camera: the first frames show no turn", flat=True)
+    frames = np.unique(np.linspace(0, len(W) - 1, 16).astype(int))
+    W_few, visible_few = W[np.ix_(frames, [0, 1], chosen)], visible[np.ix_(frames, chosen)]
+    found = []
+    for axis in (np.zeros(3), *tilt_axes()):
+        start = sheet(first[:, chosen], rotation_from_quaternion(quaternion_exp(np.deg2rad(TILT_DEGREES) * axis)), camera)
+        start = follow(W_few, visible_few, start, camera)
+        found.append(bundle_adjust(W_few, visible_few, start, camera, flat=bool(axis.any()), sweeps=15 if axis.any() else 1))
+    level, tilted = found[0], min(found[1:], key=lambda result: result[1])
+    turn = view_turn_degrees(tilted[0].R)
+    if tilted[1] > TILT_GAIN * level[1] or turn < TURN_DEGREES:
+        note = f"flat sheet facing the camera: its tilt does not show in {len(W)} frames"
+        return RestShape("plane", frontal, note, flat=True)
+    whole = sheet(first, tilted[0].R[0], camera)
+    tilt = np.rad2deg(np.arccos(np.clip(abs(whole.R[0, 2, 2]), 0, 1)))
+    note = f"flat sheet tilted {tilt:.0f}° in the first frame, turned {turn:.0f}°, reprojection error {tilted[1]:.2f} px"
+    return RestShape("plane", whole.in_first_frame(), note, flat=True)
+
+
+def given(shape: Array, kind: Kind, note: str) -> RestShape:
+    """A rest shape (3, p) from elsewhere: a mesh file, or the first true shape."""
+    shape = shape - shape.mean(axis=1, keepdims=True)
+    depths = np.linalg.svd(shape, compute_uv=False)
+    motion = RigidMotion(shape, np.eye(3)[None], np.ones(1), np.zeros((1, 2)))
+    return RestShape(kind, motion, note, flat=bool(depths[2] < 1e-3 * depths[0]))
+
+
+def sheet(image: Array, R: Array, camera: Camera) -> RigidMotion:
+    """The flat sheet in the plane turned by R (3, 3) that looks like the image (2, p) px."""
+    W = image - camera.center_px[:, None]
+    t = W.mean(axis=1)
+    motion = RigidMotion(np.zeros((3, W.shape[1])), R[None], np.ones(1), t[None])
+    shape = solve_points(W[None], np.ones((1, W.shape[1])), motion, camera, flat=True)
+    return replace(motion, shape=shape)
+
+
+def tilt_axes() -> Array:
+    """(4, 3) unit rotation axes in the image plane."""
+    return np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+
+
+def follow(W: Array, visible: Visibility, motion: RigidMotion, camera: Camera) -> RigidMotion:
+    """Poses of frames (F, 2, p) px one after another, starting from a motion of one frame."""
+    h = visible.astype(np.float64)
+    W = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None]
+    energy = pose_energy(camera)
+    R, s, t = [motion.R[0]], [motion.s[0]], [motion.t[0]]
+    for f in range(len(W)):
+        now = RigidMotion(motion.shape, R[-1][None], np.array(s[-1:]), t[-1][None])
+        now, _ = adjust_poses(W[f : f + 1], h[f : f + 1], now, camera, energy)
+        R.append(now.R[0])
+        s.append(now.s[0])
+        t.append(now.t[0])
+    return RigidMotion(motion.shape, np.array(R[1:]), np.array(s[1:]), np.array(t[1:]))
+
+
+def first_image(W: Array, visible: Visibility) -> Array:
+    """Image (2, p) px of all points in the first frame, those not visible there completed from the others."""
+    if visible[0].all():
+        return W[0]
+    known = visible.sum(axis=0) >= 2
+    first = np.where(visible[0], W[0], np.nan)
+    if len(W) >= 3 and known.sum() >= 4:
+        A, t, S = affine_structure(W[:, :, known], visible[:, known])
+        first[:, known] = np.where(visible[0, known], W[0][:, known], A[0] @ S + t[0][:, None])
+    missing = np.isnan(first[0])
+    centre = np.nanmean(first, axis=1)
+    for i in np.flatnonzero(missing):
+        seen = np.flatnonzero(visible[:, i])
+        first[:, i] = W[seen[0], :, i] if seen.size else centre
+    return first
+
+
+def judging_points(W: Array, visible: Visibility) -> NDArray[np.int64]:
+    """Indices of well-spread points that are seen often enough to judge the motion by."""
+    often = np.flatnonzero(visible.mean(axis=0) >= min(0.8, np.quantile(visible.mean(axis=0), 0.5)))
+    place = np.where(visible[:, None], W, 0.0).sum(axis=0) / visible.sum(axis=0).clip(1)
+    return often[farthest_points(place[:, often].T, JUDGING_POINTS)]
+
+
+def image_affinities(W: Array, visible: Visibility) -> tuple[Array, Array]:
+    """Affine maps (F, 2, 2) of the first image onto each, and what they leave over, (F,) RMS px."""
+    both = (visible & visible[0]).astype(np.float64)
+    first = np.where(visible[0], W[0], 0.0)
+    B = np.concatenate([first, np.ones((1, W.shape[2]))])
+    gram = np.einsum("ip,fp,jp->fij", B, both, B, optimize=True)
+    known = np.where(both[:, None] > 0, W, 0.0)
+    maps = np.linalg.solve(gram + 1e-9 * np.eye(3), np.einsum("fcp,ip->fic", known, B)).transpose(0, 2, 1)
+    left = (known - maps @ B) * both[:, None]
+    return maps[:, :, :2], np.sqrt((left**2).sum(axis=(1, 2)) / both.sum(axis=1).clip(1))
+
+
+def apparent_change(W: Array, visible: Visibility) -> float:
+    """Largest RMS motion in pixels of a frame against the first beyond a similarity: what turning or bending causes."""
+    maps, left = image_affinities(W, visible)
+    size = float(np.sqrt(np.var(np.where(visible[0], W[0], np.nan)[:, visible[0]], axis=1).sum() / 2))
+    values = np.linalg.svd(maps, compute_uv=False)
+    stretch = (values[:, 0] - values[:, 1]) / 2 * size
+    return float(np.sqrt(stretch**2 + left**2).max())
+
+
+def foreshortening_degrees(W: Array, visible: Visibility) -> float:
+    """Turn of a flat object that would explain the strongest foreshortening against the first frame."""
+    values = np.linalg.svd(image_affinities(W, visible)[0], compute_uv=False)
+    return float(np.rad2deg(np.arccos(np.clip(values[:, 1] / values[:, 0], 0, 1))).max())
+
+
+def halves_disagreement(W: Array, visible: Visibility) -> float:
+    """Relative difference of the shapes that the even and the odd frames give, the mirror image allowed."""
+    try:
+        a, b = (factorize(W[k::2], visible[k::2]).motion.shape for k in (0, 1))
+    except ReconstructionError:
+        return float("inf")
+    return min(shape_difference(a, b), shape_difference(a, np.diag([1.0, 1.0, -1.0]) @ b))
+
+
+def shape_difference(a: Array, b: Array) -> float:
+    """‖sRb − a‖/‖a‖ of centred shapes (3, p) with the best rotation and scale."""
+    U, values, Vt = np.linalg.svd(a @ b.T)
+    values[2] *= np.sign(np.linalg.det(U @ Vt))
+    return float(np.sqrt(max(0.0, 1 - values.sum() ** 2 / ((a**2).sum() * (b**2).sum()))))
