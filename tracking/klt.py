@@ -156,7 +156,8 @@ class PointTracker:
 def _inside(points: Array, shape: tuple[int, ...]) -> Flags:
     """Which points (n, 2) are in the picture, away from its border; NaN is not."""
     limit = np.array([shape[1], shape[0]]) - 1.0 - BORDER_PX
-    return np.all((points >= BORDER_PX) & (points <= limit), axis=1)
+    inside = (points >= BORDER_PX) & (points <= limit)
+    return inside[:, 0] & inside[:, 1]
 
 
 def _pictures(gray: Image) -> tuple[Picture, Picture]:
