@@ -38,23 +38,37 @@ class Camera:
         return scaled + self.center_px[:, None]
 
 
-def rotation_from_quaternion(q: Array) -> Array:
-    """Rotations (..., 3, 3) of unit quaternions (..., 4), w first."""
-    w, x, y, z = np.moveaxis(np.asarray(q, np.float64), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+def _hamilton() -> Array:
+    """LEFT (4, 4, 4): ab = (Σ_i a_i LEFT[i]) b, w first."""
+    left = np.zeros((4, 4, 4))
+    left[0] = np.eye(4)
+    for i, j, k in ((1, 2, 3), (2, 3, 1), (3, 1, 2)):
+        left[i, i, 0], left[i, 0, i] = 1.0, -1.0
+        left[i, k, j], left[i, j, k] = 1.0, -1.0
+    return left
+
+
+# Constant tensors instead of formulas: one small product for a whole window of frames.
+LEFT = _hamilton()
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+# R(q)v is the vector part of q v q*, so R = Σ_ij q_i q_j SANDWICH[ij].
+SANDWICH = np.einsum("ikm,nmj,j->ijkn", LEFT, LEFT, CONJUGATE)[:, :, 1:, 1:].reshape(16, 9)
+
+
+def left_matrix(q: Array) -> Array:
+    """Matrices (..., 4, 4) that multiply by the quaternions (..., 4) from the left."""
+    return np.asarray((q @ LEFT.reshape(4, 16)).reshape(*q.shape, 4))
 
 
 def quaternion_product(a: Array, b: Array) -> Array:
     """Hamilton product (..., 4) of quaternions (..., 4), w first: R(ab) = R(a) R(b)."""
-    aw, av = a[..., :1], a[..., 1:]
-    bw, bv = b[..., :1], b[..., 1:]
-    scalar = aw * bw - np.sum(av * bv, axis=-1, keepdims=True)
-    return np.concatenate([scalar, aw * bv + bw * av + np.cross(av, bv)], axis=-1)
+    return np.asarray((left_matrix(a) @ b[..., None])[..., 0])
+
+
+def rotation_from_quaternion(q: Array) -> Array:
+    """Rotations (..., 3, 3) of unit quaternions (..., 4), w first."""
+    squares = (q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
+    return np.asarray((squares @ SANDWICH).reshape(*q.shape[:-1], 3, 3))
 
 
 def quaternion_exp(theta: Array) -> Array:

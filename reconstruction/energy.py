@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction import statistics
-from reconstruction.camera import quaternion_exp, quaternion_product, rotation_from_quaternion
+from reconstruction.camera import left_matrix, quaternion_exp, quaternion_product, rotation_from_quaternion
 from reconstruction.statistics import Statistics
 
 Array = NDArray[np.float64]
@@ -60,8 +60,9 @@ class State:
     def matrices(self) -> Array:
         """M = [sR', sR'Λ', (t; 0)] (n, 3, 4 + r)."""
         A = self.scaled_rotations()
-        t = np.pad(self.t, ((0, 0), (0, 1)))[:, :, None]
-        return np.concatenate([A, A @ self.Lambda, t], axis=2)
+        M = np.zeros((len(self), 3, 4 + self.Lambda.shape[2]))
+        M[:, :, :3], M[:, :, 3:-1], M[:, :2, -1] = A, A @ self.Lambda, self.t
+        return M
 
 
 def join(states: list[State]) -> State:
@@ -247,8 +248,7 @@ def quaternion_difference(earlier: Array, later: Array) -> Array:
 
 def quaternion_tangent(q: Array) -> Array:
     """dq/dθ (n, 4, 3) of q ⊗ exp(θ/2) at θ = 0."""
-    basis = np.pad(np.eye(3), ((0, 0), (1, 0)))
-    return 0.5 * np.stack([quaternion_product(q, np.broadcast_to(e, q.shape)) for e in basis], axis=2)
+    return 0.5 * left_matrix(q)[..., 1:]
 
 
 def add_smoothness(normal: Normal, energy: Energy, state: State, before: State | None) -> None:

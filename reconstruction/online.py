@@ -178,9 +178,9 @@ def build_energy(model: Model, rest: RestShape, camera: Camera, settings: Settin
     if deformation == "inextensible":
         edges = model.coarse_edges()
         return Energy(
-            rotation=1e-4, scale=scale, deformation=1e-3, rest=1e-3, inextensibility=3.0, rows=rows, edges=edges
+            rotation=1e-3, scale=scale, deformation=1e-3, rest=1e-3, inextensibility=3.0, rows=rows, edges=edges
         )
-    return Energy(rotation=1e-4, scale=scale, deformation=1e-2, rest=1e-2, rows=rows)
+    return Energy(rotation=1e-3, scale=scale, deformation=1e-2, rest=1e-2, rows=rows)
 
 
 class SlidingWindow:
@@ -260,7 +260,7 @@ def extrapolated(earlier: State, last: State) -> State:
     )
 
 
-ROBUST_SIGMAS = 3.0
+ROBUST_SIGMAS = 5.0
 
 
 def robust_weights(residuals: Array, visible: Visibility) -> Array:

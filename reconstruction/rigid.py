@@ -48,7 +48,7 @@ class RigidMotion:
 def pose_energy(camera: Camera, tied: bool = False) -> Energy:
     """The energy of a rigid shape's poses."""
     scale = PERSPECTIVE_SCALE if camera.perspective else ORTHOGRAPHIC_SCALE
-    return Energy(rows=(), rest=0.0, rotation=1e-4, scale=scale, tied=tied)
+    return Energy(rows=(), rest=0.0, rotation=1e-3, scale=scale, tied=tied)
 
 
 def bundle_adjust(

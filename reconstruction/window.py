@@ -20,7 +20,7 @@ class Solver:
 
     iterations: int = 25
     """Most steps tried."""
-    tolerance: float = 1e-5
+    tolerance: float = 1e-3
     """Stop when a step lowers the energy by less than this share of it."""
     damping: float = 1e-4
     """First damping, relative to the diagonal of the normal matrix."""

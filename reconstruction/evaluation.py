@@ -1,0 +1,104 @@
+"""Scores against ground truth: e3d of the paper's §6, and its noise and missing data."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction import ReconstructionError
+from reconstruction.camera import nearest_rotation
+from reconstruction.mesh import Mesh, locate
+
+Array = NDArray[np.float64]
+
+MIRROR = np.diag([1.0, 1.0, -1.0])
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors as fractions of the true shape's size.
+
+    Attributes:
+        e3d: mean over frames of ‖Ŝ − S‖_F/‖S‖_F: centred, one scale and one depth sign for all, best rotation per frame.
+        e3d_camera: the same without the rotation, so that a wrong pose counts.
+        e3d_static: e3d of the rest shape alone, never deformed.
+        per_frame: (K,) e3d of each truth frame.
+        frames: (K,) the truth frames scored.
+        points: number of points scored.
+    """
+
+    e3d: float
+    e3d_camera: float
+    e3d_static: float
+    per_frame: Array
+    frames: NDArray[np.int64]
+    points: int
+
+
+def score(shapes: Array, rest: Array, truth: Array, frames: NDArray[np.int64]) -> Score:
+    """Compare shapes (K, 3, n) and the rest shape (3, n) with the true shapes (K, 3, n) of the given frames (K,)."""
+    per_frame = e3d(shapes, truth)
+    still = np.broadcast_to(rest, truth.shape)
+    return Score(
+        e3d=float(per_frame.mean()),
+        e3d_camera=float(e3d(shapes, truth, turned=False).mean()),
+        e3d_static=float(e3d(still, truth).mean()),
+        per_frame=per_frame,
+        frames=frames,
+        points=truth.shape[2],
+    )
+
+
+def e3d(shapes: Array, truth: Array, *, turned: bool = True) -> Array:
+    """Error (K,) of shapes (K, 3, n) against truth (K, 3, n); `turned` grants each frame its best rotation."""
+    truth = truth - truth.mean(axis=2, keepdims=True)
+    shapes = shapes - shapes.mean(axis=2, keepdims=True)
+    candidates = []
+    for sign in (np.eye(3), MIRROR):
+        S = sign @ shapes
+        if turned:
+            S = nearest_rotation(truth @ S.transpose(0, 2, 1)) @ S
+        S = S * ((S * truth).sum() / (S * S).sum())
+        candidates.append(np.linalg.norm(S - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2)))
+    return np.asarray(min(candidates, key=lambda error: float(error.mean())))
+
+
+def followed(
+    shapes: Sequence[Array], projections: Sequence[Array], rest: Array, mesh: Mesh, truth_px: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Where truth points seen at truth_px (n, 2) in the first truth frame are on the moving mesh.
+
+    Args:
+        shapes: K vertex positions (3, p) in the truth frames.
+        projections: their images (p, 2); only the first is used.
+        rest: (3, p) rest shape.
+
+    Returns:
+        points (K, 3, m) and rest points (3, m), barycentric in the mesh; inside (n,) which truth points those are.
+
+    Raises:
+        ReconstructionError: no truth point lies in the mesh.
+    """
+    face, weights = locate(projections[0], mesh, truth_px)
+    inside = face >= 0
+    if inside.sum() < 3:
+        raise ReconstructionError("fewer than 3 truth points lie inside the mesh in the first truth frame: check --roi")
+    corners, weights = mesh.faces[face[inside]], weights[inside]
+
+    def at(S: Array) -> Array:
+        return np.asarray(np.einsum("dnk,nk->dn", S[:, corners], weights))
+
+    return np.stack([at(S) for S in shapes]), at(rest), inside
+
+
+def with_noise(W: Array, level: float, rng: np.random.Generator) -> Array:
+    """Observations (F, 2, p) with Gaussian noise of `level` times the largest distance to the centroid (paper §6)."""
+    centred = W - np.nanmean(W, axis=2, keepdims=True)
+    sigma = level * float(np.nanmax(np.linalg.norm(centred, axis=1)))
+    return np.asarray(W + rng.normal(0.0, sigma, W.shape))
+
+
+def with_missing(visible: NDArray[np.bool_], share: float, rng: np.random.Generator) -> NDArray[np.bool_]:
+    """Visibility (F, p) with a share of its entries hidden uniformly at random."""
+    return visible & (rng.random(visible.shape) >= share)
