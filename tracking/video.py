@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking import TrackingError
+from tracking.images import ImageFiles
 
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # in case cv2 was imported before us
 
@@ -213,45 +214,6 @@ class Video:
         )
 
 
-class _ImageFiles:
-    """The files of a printf pattern in the order of their numbers, which may start anywhere and have gaps."""
-
-    def __init__(self, pattern: str) -> None:
-        path = Path(pattern)
-        name = re.fullmatch(r"(.*?)%0?(\d*)d(.*)", path.name)
-        if name is None:
-            raise TrackingError(
-                f"{pattern}: give the number of the image once in the file's name, as img%04d.png"
-            )
-        before, _, after = name.groups()
-        numbered = re.compile(re.escape(before) + r"(\d+)" + re.escape(after))
-        found: list[tuple[int, Path]] = []
-        if path.parent.is_dir():
-            matches = ((numbered.fullmatch(file.name), file) for file in path.parent.iterdir())
-            found = [(int(m[1]), file) for m, file in matches if m and path.name % int(m[1]) == file.name]
-        if not found:
-            raise TrackingError(
-                f"no image file matches {pattern}; the number stands for the frame, as in img%04d.png"
-            )
-        self._files = [file for _, file in sorted(found)]
-        self._next = 0
-
-    def grab(self) -> bool:
-        self._next += 1
-        return self._next <= len(self._files)
-
-    def retrieve(self) -> tuple[bool, Image]:
-        encoded = np.fromfile(self._files[self._next - 1], np.uint8)
-        image = cv2.imdecode(encoded, cv2.IMREAD_COLOR) if encoded.size else None
-        return image is not None, cast(Image, image)
-
-    def get(self, propId: int, /) -> float:
-        return float(len(self._files)) if propId == cv2.CAP_PROP_FRAME_COUNT else 0.0
-
-    def release(self) -> None:
-        self._next = len(self._files)
-
-
 def _open(source: str) -> _Capture:
     if re.fullmatch(r"\d+", source):
         camera = cv2.VideoCapture(int(source))
@@ -263,7 +225,7 @@ def _open(source: str) -> _Capture:
     if "://" not in source:
         path = Path(source)
         if re.search(r"%0?\d*d", source) and not path.exists():
-            return _ImageFiles(source)
+            return ImageFiles(source)
         if path.is_dir():
             raise TrackingError(
                 f"{source} is a folder; give the images in it by a pattern, as {source}/img%04d.png"
