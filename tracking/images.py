@@ -54,6 +54,7 @@ class ImageFiles:
         return image is not None, cast(Image, image)
 
     def get(self, propId: int, /) -> float:
+        """The number of files for CAP_PROP_FRAME_COUNT; 0, unknown, for any other property."""
         return float(len(self._files)) if propId == cv2.CAP_PROP_FRAME_COUNT else 0.0
 
     def release(self) -> None:

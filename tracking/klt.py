@@ -19,9 +19,9 @@ Picture = NDArray[np.float32]
 
 PATCH_RADIUS = 7
 BORDER_PX = 4.0  # nearer to the border a point counts as having left
-# Correlations with the reference. Measured on kinect_paper at true places (median, worst 2 %), in the fine and
-# the half picture: 0.94, 0.85 and 0.96, 0.88; under 8 px of motion blur 0.48, 0.07 and 0.72, 0.47; behind an
-# occluder mostly below 0.3.
+# Correlations with the reference. Measured on kinect_paper at true places (median, worst 2 %), in the fine
+# and the half picture: 0.94, 0.85 and 0.96, 0.88; under 8 px of motion blur 0.48, 0.07 and 0.72, 0.47; behind
+# an occluder mostly below 0.3.
 KEEP_SCORE = 0.5  # below in both pictures, a tracked point is given up
 CLEAR_SCORE = 0.8  # above in the fine picture, its drift is removed there
 BLURRED_SCORE = 0.65  # above in the half picture, it is removed there
