@@ -8,6 +8,13 @@ SEEN_RGB = (64, 224, 128)
 PREDICTED_RGB = (255, 176, 0)
 LOST_RGB = (255, 48, 96)
 WIREFRAME_RGBA = (120, 200, 255, 80)
+SPECTRUM_RGB = (150, 160, 255)
+LAMBDA_RGB = (
+    ((40, 120, 255), (100, 160, 255), (160, 200, 255)),
+    ((0, 160, 110), (60, 200, 150), (140, 230, 190)),
+    ((255, 130, 0), (255, 170, 80), (255, 210, 150)),
+)
+"""Leading modes of Γ_α, Γ_β, Γ_τ: a row of Λ has a hue, higher modes are paler."""
 
 
 def blueprint() -> rrb.Blueprint:
@@ -54,12 +61,12 @@ def blueprint() -> rrb.Blueprint:
                         ),
                         name="Quality",
                     ),
-                    rrb.Vertical(
-                        rrb.TimeSeriesView(name="Leading coefficients of Λ, px", origin=entities.LEADING),
+                    rrb.Horizontal(
+                        rrb.TimeSeriesView(name="Leading coefficients, px", origin=entities.LEADING),
                         rrb.BarChartView(
-                            name="Λ of this frame, mode by mode",
-                            origin=entities.COEFFICIENTS,
-                            contents=[f"+ $origin/{row}" for row in entities.ROWS],
+                            name="This frame: Γα, Γβ, Γτ by mode",
+                            origin=entities.SPECTRUM,
+                            plot_legend=rrb.PlotLegend(visible=False),
                         ),
                         name="Coefficients",
                     ),

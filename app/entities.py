@@ -38,7 +38,7 @@ Every frame with a shape:
 - `world/camera/points/predicted`: Points2D, not seen; drawn where the model says they are.
 - `estimate`: modeshape.Estimate with quaternion (4) w first, t (2) px, s, Lambda (3r), visible (p) bool.
 - `quality/error`: Scalars, RMS and median reprojection error, px.
-- `coefficients/alpha`, `beta`, `tau`: BarChart, a row Γ of Λ (r).
+- `coefficients/spectrum`: BarChart, Λ (3r): Γ_α, Γ_β, Γ_τ side by side.
 - `coefficients/leading`: Scalars, the first entries of Γ_α, Γ_β, Γ_τ.
 """
 
@@ -61,11 +61,8 @@ MODEL = "model"
 ERROR = "quality/error"
 VISIBLE = "quality/visible"
 TIMING = "timing"
-COEFFICIENTS = "coefficients"
+SPECTRUM = "coefficients/spectrum"
 LEADING = "coefficients/leading"
 EVENTS = "events"
 CONFIGURATION = "configuration"
 SUMMARY = "summary"
-
-ROWS = ("alpha", "beta", "tau")
-"""Rows of Λ: along the two axes of the main plane, and across it."""

@@ -51,11 +51,7 @@ def texture(crop: Image, points_px: NDArray[np.float64], faces: NDArray[np.int64
     return rr.Mesh3D.from_fields(
         triangle_indices=faces.astype(np.uint32),
         # Without normals the viewer does not light the mesh: the texture keeps its colours, from both sides.
-        vertex_texcoords=((points_px + 0.5) / (width, height)).astype(
-            np.float32
-        ),  # pixel centres are at .5 there
+        vertex_texcoords=((points_px + 0.5) / (width, height)).astype(np.float32),  # pixel centres are at .5 there
         albedo_texture_buffer=cv2.cvtColor(crop, cv2.COLOR_BGR2RGB).tobytes(),
-        albedo_texture_format=rr.components.ImageFormat(
-            width, height, color_model=model, channel_datatype="U8"
-        ),
+        albedo_texture_format=rr.components.ImageFormat(width, height, color_model=model, channel_datatype="U8"),
     )

@@ -4,30 +4,32 @@ What is written where is listed in `app.entities`.
 """
 
 import json
+import os
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, Self
+from typing import Literal, Self
+
+# Read when Rerun is loaded, here first: what goes wrong is said by us, once, without a time stamp.
+os.environ.setdefault("RUST_LOG", "off")
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
 from app import entities
-from app.blueprint import LOST_RGB, PREDICTED_RGB, SEEN_RGB, WIREFRAME_RGBA
+from app.blueprint import LAMBDA_RGB, LOST_RGB, PREDICTED_RGB, SEEN_RGB, SPECTRUM_RGB, WIREFRAME_RGBA
 from app.errors import UsageError
 from app.picture import cropped, embedded_video, jpeg, texture
 from app.stream import Stream, claim
 from app.viewer import running_viewer, spawned_viewer
 from app.wireframe import edge_strips, line_strips
 from reconstruction.camera import Camera
+from reconstruction.model import ShapeEstimate
 from reconstruction.modes import ModalBasis
-from reconstruction.online import ShapeEstimate
+from tracking.klt import Observation
 from tracking.video import Frame
-
-if TYPE_CHECKING:
-    from tracking.klt import Observation
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -92,7 +94,7 @@ class Recording:
         if image == "video":
             self._stream.log(entities.IMAGE, asset, static=True)
 
-    def observe(self, frame: Frame, observation: "Observation", *, phase: str) -> None:
+    def observe(self, frame: Frame, observation: Observation, *, phase: str) -> None:
         """A frame, its tracked points and the run's phase."""
         if not self._stream.open:
             return
@@ -156,8 +158,16 @@ class Recording:
         )
         self._stream.log(entities.MESH, texture(crop, texture_px - origin, faces), static=True)
         self._camera = camera
-        shown = range(min(LEADING, len(basis.eigenvalues)))
-        self._style(entities.LEADING, rr.SeriesLines(names=[f"{row}{k + 1}" for row in "αβτ" for k in shown]))
+        modes = len(basis.eigenvalues)
+        shown = min(LEADING, modes)
+        names = [f"{row}{k + 1}" for row in "αβτ" for k in range(shown)]
+        colors = [color for row in LAMBDA_RGB for color in row[:shown]]
+        self._style(entities.LEADING, rr.SeriesLines(names=names, colors=colors))
+        # Bars in three groups. Rerun refuses a BarChart without values; static ones would hide every frame.
+        places = np.arange(3 * modes) + np.repeat(np.arange(3) * max(1, modes // 5), modes)
+        abscissa = rr.components.TensorDataBatch(places).described(rr.BarChart.descriptor_abscissa())
+        color = rr.components.ColorBatch(SPECTRUM_RGB).described(rr.BarChart.descriptor_color())
+        self._stream.log(entities.SPECTRUM, [abscissa, color], static=True)
 
     def estimate(self, index: int, time_s: float, estimate: ShapeEstimate) -> None:
         """One frame's shape and pose."""
@@ -183,8 +193,7 @@ class Recording:
         if residuals.size:
             rms_and_median = [np.sqrt(np.mean(residuals**2)), np.median(residuals)]
             self._stream.log(entities.ERROR, rr.Scalars(rms_and_median))
-        for row, coefficients in zip(entities.ROWS, estimate.Lambda, strict=True):
-            self._stream.log(f"{entities.COEFFICIENTS}/{row}", rr.BarChart(coefficients))
+        self._stream.log(entities.SPECTRUM, rr.BarChart.from_fields(values=estimate.Lambda.ravel()))
         self._stream.log(entities.LEADING, rr.Scalars(estimate.Lambda[:, :LEADING].ravel()))
 
     def timing(self, index: int, time_s: float, stage_ms: Mapping[str, float]) -> None:
@@ -234,7 +243,7 @@ class Recording:
         self._stream.log("/", rr.AnnotationContext(classes), static=True)
         for k, (entity, _) in enumerate(kinds, start=1):
             # A negative radius is in points of the screen: the same size at every zoom.
-            points = rr.Points2D.from_fields(class_ids=k, radii=-1.75, draw_order=30 + k)
+            points = rr.Points2D.from_fields(class_ids=k, radii=-2.0, draw_order=30 + k)
             self._stream.log(entity, points, static=True)
         lines = rr.LineStrips2D.from_fields(colors=[WIREFRAME_RGBA], radii=-0.5, draw_order=20)
         self._stream.log(entities.WIREFRAME, lines, static=True)

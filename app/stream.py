@@ -1,16 +1,18 @@
 """The channel a recording is written through: Rerun's stream to a file, to viewers, to both or to nothing."""
 
-import os
+import shutil
+from collections.abc import Iterable
 from pathlib import Path
-
-# Read when Rerun is loaded: its notes about ordinary work stay off the terminal.
-os.environ.setdefault("RUST_LOG", "error")
 
 import rerun as rr
 
 from app import entities
 from app.blueprint import blueprint
 from app.errors import UsageError
+
+FULL_BYTES = 2**20  # so little left on a disk explains a failure
+
+Loggable = rr.AsComponents | Iterable[rr.DescribedComponentBatch]
 
 
 class Stream:
@@ -27,10 +29,14 @@ class Stream:
         if path is not None:
             sinks.append(rr.FileSink(path))
         self._stream = rr.RecordingStream(entities.APPLICATION) if sinks else None
-        if self._stream is not None:
+        if self._stream is None:
+            return
+        try:
             self._stream.set_sinks(*sinks, default_blueprint=blueprint())
-            self._stream.set_log_time_enabled(False)
-            self._stream.set_log_tick_enabled(False)
+        except RuntimeError as error:
+            raise self._failure(error) from error
+        self._stream.set_log_time_enabled(False)
+        self._stream.set_log_tick_enabled(False)
 
     @property
     def open(self) -> bool:
@@ -48,7 +54,7 @@ class Stream:
             self._stream.set_time(entities.FRAME, sequence=index)
             self._stream.set_time(entities.TIME, duration=time_s)
 
-    def log(self, entity: str, what: rr.AsComponents, *, static: bool = False) -> None:
+    def log(self, entity: str, what: Loggable, *, static: bool = False) -> None:
         """Write one of Rerun's archetypes."""
         if self._stream is not None:
             self._stream.log(entity, what, static=static)
@@ -59,7 +65,7 @@ class Stream:
         self.log(entity, named, static=static)
 
     def flush(self) -> None:
-        """Wait until everything is on its way to the disk.
+        """Wait until everything is on its way to the disk; a viewer that was closed meanwhile is no failure.
 
         Raises:
             UsageError: it could not be written.
@@ -69,8 +75,8 @@ class Stream:
         try:
             self._stream.flush()
         except RuntimeError as error:
-            remedy = "free some space or choose another place with --out"
-            raise UsageError(f"cannot write {self._path}: {error}; {remedy}") from error
+            if "gRPC" not in str(error):
+                raise self._failure(error) from error
 
     def close(self) -> None:
         """Complete the file; without it, `rerun rrd verify` refuses it.
@@ -85,6 +91,11 @@ class Stream:
                 self._stream.disconnect()
                 self._stream = None
 
+    def _failure(self, error: RuntimeError) -> UsageError:
+        full = self._path is not None and shutil.disk_usage(self._path.parent).free < FULL_BYTES
+        reason = "the disk is full" if full else str(error)
+        return UsageError(f"cannot write {self._path}: {reason}; choose another place with --out")
+
 
 def claim(path: Path, *, overwrite: bool) -> None:
     """Make sure that a file can be written, creating its folder, before anything is computed.
@@ -96,8 +107,6 @@ def claim(path: Path, *, overwrite: bool) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.open("ab" if overwrite else "xb").close()
     except FileExistsError as error:
-        raise UsageError(
-            f"{path} exists: replace it with --overwrite, or choose another with --out"
-        ) from error
+        raise UsageError(f"{path} exists: replace it with --overwrite, or choose another with --out") from error
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror}; choose another place with --out") from error

@@ -26,18 +26,12 @@ def running_viewer(address: str) -> str:
     except ValueError:
         host = None
     if host is None or not parts.scheme.startswith("rerun"):
-        raise UsageError(
-            f"--connect {address} is no viewer's address: give host:port, for instance 127.0.0.1:{PORT}"
-        )
+        raise UsageError(f"--connect {address} is no viewer's address: give host:port, for instance 127.0.0.1:{PORT}")
     try:  # Rerun itself would wait 5 seconds, and then go on without a viewer
         socket.create_connection((host, port), timeout=TIMEOUT_S).close()
     except OSError as error:
-        raise UsageError(
-            f"no Rerun viewer answers at {host}:{port}: start one with `rerun`, or use --view"
-        ) from error
-    return (
-        f"{parts.scheme}://{parts.netloc if parts.port else f'{parts.netloc}:{port}'}{parts.path or '/proxy'}"
-    )
+        raise UsageError(f"no Rerun viewer answers at {host}:{port}: start one with `rerun`, or use --view") from error
+    return f"{parts.scheme}://{parts.netloc if parts.port else f'{parts.netloc}:{port}'}{parts.path or '/proxy'}"
 
 
 def spawned_viewer() -> str:
@@ -50,7 +44,5 @@ def spawned_viewer() -> str:
     try:
         rr.spawn(port=PORT, connect=False, hide_welcome_screen=True, executable_path=str(program))
     except RuntimeError as error:
-        raise UsageError(
-            f"the viewer does not start ({error}): leave out --view and open the file later"
-        ) from error
+        raise UsageError(f"the viewer does not start ({error}): leave out --view and open the file later") from error
     return f"rerun+http://127.0.0.1:{PORT}/proxy"

@@ -27,5 +27,7 @@ def manhattan(rest: Array, edges: NDArray[np.int64]) -> Array:
     graph = coo_array((lengths, (edges[:, 0], edges[:, 1])), shape=(p, p)).tocsr()
     D = np.asarray(dijkstra(graph, directed=False))
     if not np.isfinite(D).all():
-        raise ReconstructionError("the mesh of the rest shape falls into pieces: use --metric euclidean, or a connected mesh")
+        raise ReconstructionError(
+            "the mesh of the rest shape falls into pieces: use --metric euclidean, or a connected mesh"
+        )
     return D

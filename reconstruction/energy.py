@@ -152,9 +152,7 @@ def linearise(energy: Energy, data: Statistics, state: State, before: State | No
     """Value, gradient and Gauss-Newton blocks of the whole energy at a state."""
     n, r = len(state), state.Lambda.shape[2]
     d = POSE + len(energy.rows) * r
-    normal = Normal(
-        evaluate(energy, data, state, before), np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((n - 1, d, d))
-    )
+    normal = Normal(evaluate(energy, data, state, before), np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((n - 1, d, d)))
     add_data(normal, energy, data, state)
     add_rest(normal, energy, state)
     if energy.edges is not None:
@@ -193,7 +191,8 @@ def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> 
     normal.diagonal[:, POSE:, :POSE] += mixed.transpose(0, 2, 1)
     x, y, z = (free[:, c] for c in range(3))
     factors = np.stack(
-        [outer(x, x) + outer(y, y), -outer(x, z) - outer(z, x), -outer(y, z) - outer(z, y), outer(z, z)], axis=1
+        [outer(x, x) + outer(y, y), -outer(x, z) - outer(z, x), -outer(y, z) - outer(z, y), outer(z, z)],
+        axis=1,
     )
     modes = data.gram[:, :, 3:-1, 3:-1]
     kron = np.einsum("ngij,ngab->niajb", factors, modes, optimize=True)

@@ -73,6 +73,8 @@ def followed(
         shapes: K vertex positions (3, p) in the truth frames.
         projections: their images (p, 2); only the first is used.
         rest: (3, p) rest shape.
+        mesh: connectivity of the vertices.
+        truth_px: (n, 2) pixels of the truth points in the first truth frame.
 
     Returns:
         points (K, 3, m) and rest points (3, m), barycentric in the mesh; inside (n,) which truth points those are.

@@ -58,7 +58,7 @@ def factorize(W: Array, visible: NDArray[np.bool_]) -> Factorization:
     residual = np.where(visible[:, None], W - A @ S - t[:, :, None], 0.0)
     rms = float(np.sqrt((residual**2).sum() / visible.sum()))
     Q, condition = metric_upgrade(A)
-    A, S = A @ Q, np.linalg.solve(Q, S)
+    A, S = A @ Q, np.asarray(np.linalg.solve(Q, S), np.float64)
     s = np.sqrt((A**2).sum(axis=(1, 2)) / 2)
     R = rotations_from_rows(A)
     return Factorization(RigidMotion(S, R, s, t).in_first_frame(), singular, rms, condition)
@@ -79,7 +79,7 @@ def affine_structure(W: Array, visible: NDArray[np.bool_], sweeps: int = 100) ->
     track = ((known - mean[:, :, None]) * h[:, None]).sum(axis=0) / h.sum(axis=0)  # a point's mean place
     filled = np.where(visible[:, None], W, track + mean[:, :, None])
     t = filled.mean(axis=2)
-    _, singular, Vt = np.linalg.svd((filled - t[:, :, None]).reshape(2 * F, p), full_matrices=False)
+    Vt = np.linalg.svd((filled - t[:, :, None]).reshape(2 * F, p), full_matrices=False)[2]
     S = Vt[:3] * np.sqrt(p)
     A = np.zeros((F, 2, 3))
     previous = np.inf

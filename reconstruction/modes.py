@@ -37,8 +37,8 @@ class ModalBasis:
 
     def linear_basis(self) -> Array:
         """B (3r, 3, p): the same model as a linear subspace, S = S̄ + Σ_ι φ_ι B_ι with φ = vec Λ row by row (§3.3)."""
-        basis = np.einsum("di,ap->iadp", self.Phi, self.Upsilon)
-        return basis.reshape(-1, *self.rest.shape)
+        basis: Array = np.einsum("di,ap->iadp", self.Phi, self.Upsilon).reshape(-1, *self.rest.shape)
+        return basis
 
 
 def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean") -> ModalBasis:

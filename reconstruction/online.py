@@ -14,7 +14,7 @@ from reconstruction.mesh import Mesh, mesh_from_faces, triangulate
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.modes import Metric, modal_basis, principal_axes
 from reconstruction.rest_shape import RestShape
-from reconstruction.rigid import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE, adjust_poses, pose_energy
+from reconstruction.rigid import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE, pose_energy
 from reconstruction.statistics import Statistics, stack
 from reconstruction.window import Solver, minimise
 
@@ -28,7 +28,14 @@ ROWS: dict[str, tuple[int, ...]] = {
     "general": (0, 1, 2),
     "inextensible": (0, 1, 2),
 }
-BOOTSTRAP_SCHEDULE = (10, 15, 20, 30, 45, 60)  # frames after which a rigid shape is looked for; the last decides
+BOOTSTRAP_SCHEDULE = (
+    10,
+    15,
+    20,
+    30,
+    45,
+    60,
+)  # frames after which a rigid shape is looked for; the last decides
 FEWEST_POINTS = 4
 
 
@@ -69,7 +76,14 @@ class Reconstruction:
     Args:
         camera: the camera; the paper's energy needs an orthographic one.
         settings: how to reconstruct.
-        given: a rest shape (3, p) from elsewhere, with its mesh if it has one.
+        given: a rest shape (3, p) from elsewhere.
+        mesh: its mesh, if it has one.
+
+    Attributes:
+        rest: the rest shape, once there is one.
+        window: the sliding window, once there is a rest shape.
+        bootstrap_frames: frames the bootstrap took.
+        deformation: the constraint in force; auto until the rest shape decides.
     """
 
     def __init__(
@@ -81,6 +95,8 @@ class Reconstruction:
         self.rest = given
         self._mesh = mesh
         self.window: SlidingWindow | None = None
+        self.bootstrap_frames = 0
+        self.deformation = settings.deformation
         self._waiting: list[tuple[Array, Visibility]] = []
 
     @property
@@ -95,6 +111,10 @@ class Reconstruction:
             raise ReconstructionError("there is no rest shape yet: the bootstrap is not over")
         return self.window.model
 
+    def predict(self) -> Array | None:
+        """Where the next frame will see the points, (p, 2) px at constant velocity; None while bootstrapping."""
+        return None if self.window is None else self.window.predict()
+
     def update(self, W: Array, visible: Visibility) -> list[ShapeEstimate]:
         """Take one frame's points (2, p) px with visibility (p,); returns the shapes now known, oldest first.
 
@@ -103,6 +123,8 @@ class Reconstruction:
         """
         if self.window is not None:
             return [self.window.advance(W, visible)]
+        if self.settings.modes >= W.shape[1]:
+            raise ReconstructionError(f"--modes {self.settings.modes} does not fit {W.shape[1]} points: choose fewer")
         self._waiting.append((W, visible))
         n, wanted = len(self._waiting), self.settings.bootstrap_frames
         if self.rest is not None:
@@ -141,9 +163,11 @@ class Reconstruction:
         return self._start(replace(flat, note=f"{flat.note} (no rigid shape: {doubt})"))
 
     def _start(self, rest: RestShape) -> list[ShapeEstimate]:
-        self.rest = rest
+        self.rest, self.bootstrap_frames = rest, len(self._waiting)
+        if self.deformation == "auto":
+            self.deformation = "inextensible" if rest.flat else "general"
         model = build_model(rest, self.camera, self.settings, self._mesh)
-        energy = build_energy(model, rest, self.camera, self.settings)
+        energy = build_energy(model, self.deformation, paper=self.settings.energy == "paper")
         self.window = SlidingWindow(model, energy, self.settings.window, rest)
         waiting, self._waiting = self._waiting, []
         return [self.window.advance(W, visible) for W, visible in waiting]
@@ -166,21 +190,16 @@ def build_model(rest: RestShape, camera: Camera, settings: Settings, mesh: Mesh 
     return Model(modal_basis(shape, mesh, settings.modes, settings.metric), mesh, camera)
 
 
-def build_energy(model: Model, rest: RestShape, camera: Camera, settings: Settings) -> Energy:
-    """The energy that the settings name (paper §5, §3.4)."""
-    deformation = settings.deformation
-    if deformation == "auto":
-        deformation = "inextensible" if rest.flat else "general"
+def build_energy(model: Model, deformation: Deformation, *, paper: bool) -> Energy:
+    """The energy of a constraint on the deformation (paper §5, §3.4); `paper` as printed there."""
     rows = ROWS[deformation]
-    if settings.energy == "paper":
+    if paper:
         return Energy(rows=rows, rest=0.0, deformation=1e-3, free_scale=False, tied=False)
-    scale = PERSPECTIVE_SCALE if camera.perspective else ORTHOGRAPHIC_SCALE
+    scale = PERSPECTIVE_SCALE if model.camera.perspective else ORTHOGRAPHIC_SCALE
     if deformation == "inextensible":
         edges = model.coarse_edges()
-        return Energy(
-            rotation=1e-3, scale=scale, deformation=1e-3, rest=1e-3, inextensibility=3.0, rows=rows, edges=edges
-        )
-    return Energy(rotation=1e-3, scale=scale, deformation=1e-2, rest=1e-2, rows=rows)
+        return Energy(scale=scale, deformation=1e-3, rest=1e-3, inextensibility=3.0, rows=rows, edges=edges)
+    return Energy(scale=scale, deformation=1e-2, rest=1e-2, rows=rows)
 
 
 class SlidingWindow:
@@ -213,6 +232,13 @@ class SlidingWindow:
         self._data[-1] = self.model.statistics(W, robust)
         self.state = minimise(self.energy, stack(self._data), window, self.before, Solver()).state
         return self.model.estimate(self._frame, W, visible, self.state)
+
+    def predict(self) -> Array | None:
+        """Image (p, 2) px of the next frame at constant velocity."""
+        if self.state is None:
+            return None
+        last = self.state[-1:]
+        return self.model.projection(extrapolated(self.state[-2:-1], last) if len(self.state) > 1 else last).T
 
     def _starting_state(self, W: Array, visible: Visibility) -> State:
         """Where the newest frame starts: the best of the last frame, constant velocity and the bootstrap's pose."""

@@ -144,12 +144,18 @@ def plane(W: Array, visible: Visibility, camera: Camera) -> RestShape:
     if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL_PX or len(W) < 3:
         return RestShape("plane", frontal, "flat sheet facing the camera: the first frames show no turn", flat=True)
     frames = np.unique(np.linspace(0, len(W) - 1, 16).astype(int))
-    W_few, visible_few = W[np.ix_(frames, [0, 1], chosen)], visible[np.ix_(frames, chosen)]
+    W_few, visible_few = W[frames][:, :, chosen], visible[frames][:, chosen]
     found = []
     for axis in (np.zeros(3), *tilt_axes()):
-        start = sheet(first[:, chosen], rotation_from_quaternion(quaternion_exp(np.deg2rad(TILT_DEGREES) * axis)), camera)
+        start = sheet(
+            first[:, chosen],
+            rotation_from_quaternion(quaternion_exp(np.deg2rad(TILT_DEGREES) * axis)),
+            camera,
+        )
         start = follow(W_few, visible_few, start, camera)
-        found.append(bundle_adjust(W_few, visible_few, start, camera, flat=bool(axis.any()), sweeps=15 if axis.any() else 1))
+        found.append(
+            bundle_adjust(W_few, visible_few, start, camera, flat=bool(axis.any()), sweeps=15 if axis.any() else 1)
+        )
     level, tilted = found[0], min(found[1:], key=lambda result: result[1])
     turn = view_turn_degrees(tilted[0].R)
     if tilted[1] > TILT_GAIN * level[1] or turn < TURN_DEGREES:
@@ -201,7 +207,7 @@ def follow(W: Array, visible: Visibility, motion: RigidMotion, camera: Camera) -
 def first_image(W: Array, visible: Visibility) -> Array:
     """Image (2, p) px of all points in the first frame, those not visible there completed from the others."""
     if visible[0].all():
-        return W[0]
+        return np.asarray(W[0])
     known = visible.sum(axis=0) >= 2
     first = np.where(visible[0], W[0], np.nan)
     if len(W) >= 3 and known.sum() >= 4:

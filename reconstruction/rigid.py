@@ -35,9 +35,7 @@ class RigidMotion:
 
     def in_first_frame(self) -> "RigidMotion":
         """The same in camera axes and pixels of the first frame: R[0] = 1, s[0] = 1."""
-        return replace(
-            self, shape=self.s[0] * self.R[0] @ self.shape, R=self.R @ self.R[0].T, s=self.s / self.s[0]
-        )
+        return replace(self, shape=self.s[0] * self.R[0] @ self.shape, R=self.R @ self.R[0].T, s=self.s / self.s[0])
 
     def mirrored(self) -> "RigidMotion":
         """Depth reversed: explains orthographic views as well."""
@@ -52,12 +50,23 @@ def pose_energy(camera: Camera, tied: bool = False) -> Energy:
 
 
 def bundle_adjust(
-    W: Array, visible: Visibility, motion: RigidMotion, camera: Camera, *, flat: bool = False, sweeps: int = 30
+    W: Array,
+    visible: Visibility,
+    motion: RigidMotion,
+    camera: Camera,
+    *,
+    flat: bool = False,
+    sweeps: int = 30,
 ) -> tuple[RigidMotion, float]:
     """Improve shape and poses over observations (F, 2, p) px with visibility (F, p).
 
     Args:
+        W: (F, 2, p) px; anything where not visible.
+        visible: (F, p).
+        motion: where to start.
+        camera: the camera.
         flat: keep the shape in its plane z = 0.
+        sweeps: most turns of poses and points.
 
     Returns:
         the motion and its RMS reprojection error in pixels.

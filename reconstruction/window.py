@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, get_lapack_funcs
-from scipy.linalg.blas import dtrsm, dsyrk
+from scipy.linalg import LinAlgError
+from scipy.linalg.blas import dsyrk, dtrsm
+from scipy.linalg.lapack import dpotrf
 
 from reconstruction.energy import Energy, Normal, State, evaluate, linearise
 from reconstruction.statistics import Statistics
 
 Array = NDArray[np.float64]
-(potrf,) = get_lapack_funcs(("potrf",), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def solve_block_tridiagonal(diagonal: Array, coupling: Array, right: Array) -> A
         if i:
             block = block - dsyrk(1.0, links[-1], trans=1, lower=1)
             b = b - links[-1].T @ y[i - 1]
-        factor, failed = potrf(block, lower=1, clean=0)
+        factor, failed = dpotrf(block, lower=1, clean=0)
         if failed:
             raise LinAlgError("not positive definite")
         factors.append(factor)

@@ -50,10 +50,7 @@ class Appearance:
         patches = _sample(image, points_px, upright, self._grid)
         self._patches, contrast = _normalised(patches)
         gradients = [
-            (
-                _sample(image, points_px + step, upright, self._grid)
-                - _sample(image, points_px - step, upright, self._grid)
-            )
+            (_sample(image, points_px + step, upright, self._grid) - _sample(image, points_px - step, upright, self._grid))
             / (2.0 * contrast)
             for step in np.eye(2)
         ]
@@ -65,9 +62,7 @@ class Appearance:
         normal[:, (0, 1), (0, 1)] += 1e-3 * np.trace(normal, axis1=1, axis2=2)[:, None] + 1e-9
         self._inverse = np.linalg.inv(normal)
 
-    def align(
-        self, image: Patches, points_px: Array, affine: Array, which: Indices, iterations: int
-    ) -> Alignment:
+    def align(self, image: Patches, points_px: Array, affine: Array, which: Indices, iterations: int) -> Alignment:
         """Move the points `which` to where the picture looks most like their patches.
 
         Args:

@@ -12,7 +12,7 @@ Indices = NDArray[np.int64]
 NEIGHBOURS = 10  # of which a third may be wrong and six numbers are still well determined
 STIFFNESS = 0.02  # pull towards the prior map, in units of the neighbours' mean square distance
 MIN_SUPPORT = 3.0  # trusted neighbours below which nothing can be said about a point
-ROUNDS = 4  # of re-weighting
+ROUNDS = 8  # of re-weighting
 NOISE_PX = 0.5  # least scale of disagreement: tracking noise and curvature between neighbours
 OUTLIER = 4.0  # scales from the neighbours' prediction
 
@@ -48,9 +48,7 @@ def nearest_neighbours(points_px: Array, count: int = NEIGHBOURS) -> Indices:
     return np.concatenate(rows).astype(np.int64)
 
 
-def local_motion(
-    reference_px: Array, current_px: Array, weight: Array, neighbours: Indices, prior: Array
-) -> LocalMotion:
+def local_motion(reference_px: Array, current_px: Array, weight: Array, neighbours: Indices, prior: Array) -> LocalMotion:
     """Robust local affine maps from the reference to now; points that disagree lose their say.
 
     Args:
@@ -61,26 +59,24 @@ def local_motion(
         prior: (P, 2, 2) maps to fall back on where neighbours are few or in line.
     """
     known = np.where(weight[:, None] > 0, current_px, 0.0)
+    # By what is known, not by what is trusted: else a gross outlier that upsets its neighbours would be excused.
+    support = weight[neighbours].sum(axis=1)
+    judged = (weight > 0) & (support >= MIN_SUPPORT)
     trust = weight
     for _ in range(ROUNDS):
-        affine, fitted, support = _fit(reference_px, known, trust, neighbours, prior)
+        affine, fitted = _fit(reference_px, known, trust, neighbours, prior)
         residual = np.linalg.norm(known - fitted, axis=1)
-        judged = (weight > 0) & (support >= MIN_SUPPORT)
         scale = NOISE_PX
         if judged.any():
             scale = max(scale, 1.4826 * float(np.median(residual[judged])))
         trust = np.where(judged, weight / (1.0 + (residual / (2.0 * scale)) ** 2), weight)
-    consistent = ~judged | (residual < OUTLIER * scale)
-    return LocalMotion(affine, fitted, support, consistent)
+    return LocalMotion(affine, fitted, support, ~judged | (residual < OUTLIER * scale))
 
 
-def _fit(
-    reference: Array, current: Array, weight: Array, neighbours: Indices, prior: Array
-) -> tuple[Array, Array, Array]:
-    """Weighted least squares of each neighbourhood about its centroid: maps, predictions, support."""
+def _fit(reference: Array, current: Array, weight: Array, neighbours: Indices, prior: Array) -> tuple[Array, Array]:
+    """Weighted least squares of each neighbourhood about its centroid: maps and predictions."""
     w = weight[neighbours]
-    support = w.sum(axis=1)
-    w /= np.maximum(support, 1e-9)[:, None]
+    w /= np.maximum(w.sum(axis=1), 1e-9)[:, None]
     # By coordinate, not by 2x2 matrices: stacks of tiny products cost NumPy several times as much.
     coordinates = [column[neighbours] for column in (*reference.T, *current.T)]
     means = [_rows(w, c) for c in coordinates]
@@ -97,7 +93,7 @@ def _fit(
         affine[:, row, 0] = (mx * yy - my * xy) / determinant
         affine[:, row, 1] = (my * xx - mx * xy) / determinant
     offset = reference - np.stack(means[:2], axis=1)
-    return affine, np.stack(means[2:], axis=1) + np.einsum("nij,nj->ni", affine, offset), support
+    return affine, np.stack(means[2:], axis=1) + np.einsum("nij,nj->ni", affine, offset)
 
 
 def _rows(a: Array, b: Array) -> Array:

@@ -54,9 +54,7 @@ def follow(before: Image, now: Image, points_px: Array) -> Array:
     return there
 
 
-def _both_ways(
-    before: Image, now: Image, points: Array, guess: Array, window: int, levels: int
-) -> tuple[Array, Flags]:
+def _both_ways(before: Image, now: Image, points: Array, guess: Array, window: int, levels: int) -> tuple[Array, Flags]:
     start = points.astype(np.float32)
     motion = guess.astype(np.float32)
     size, guessed = (window, window), cv2.OPTFLOW_USE_INITIAL_FLOW

@@ -26,9 +26,7 @@ class ImageFiles:
         path = Path(pattern)
         name = re.fullmatch(r"(.*?)%0?(\d*)d(.*)", path.name)
         if name is None:
-            raise TrackingError(
-                f"{pattern}: give the number of the image once in the file's name, as img%04d.png"
-            )
+            raise TrackingError(f"{pattern}: give the number of the image once in the file's name, as img%04d.png")
         before, _, after = name.groups()
         numbered = re.compile(re.escape(before) + r"(\d+)" + re.escape(after))
         found: list[tuple[int, Path]] = []
@@ -36,9 +34,7 @@ class ImageFiles:
             matches = ((numbered.fullmatch(file.name), file) for file in path.parent.iterdir())
             found = [(int(m[1]), file) for m, file in matches if m and path.name % int(m[1]) == file.name]
         if not found:
-            raise TrackingError(
-                f"no image file matches {pattern}; the number stands for the frame, as in img%04d.png"
-            )
+            raise TrackingError(f"no image file matches {pattern}; the number stands for the frame, as in img%04d.png")
         self._files = [file for _, file in sorted(found)]
         self._next = 0
 

@@ -149,9 +149,7 @@ class PointTracker:
         count = seen.sum(axis=1)[:, None]
         return np.where(count > 0, local / np.maximum(count, 1), np.median(miss[known], axis=0))
 
-    def _retrieve(
-        self, fine: Picture, coarse: Picture, points: Array, expected: Array, motion: LocalMotion
-    ) -> Array:
+    def _retrieve(self, fine: Picture, coarse: Picture, points: Array, expected: Array, motion: LocalMotion) -> Array:
         """Take up points near where they are expected: they look right and move like their neighbours."""
         sought = np.flatnonzero(_inside(expected, fine.shape))
         if len(sought) == 0:

@@ -30,9 +30,7 @@ def region_mask(
     if roi is not None:
         x, y, w, h = roi
         if w <= 0 or h <= 0 or x < 0 or y < 0 or x + w > width or y + h > height:
-            raise TrackingError(
-                f"the region {x} {y} {w} {h} (x y width height) leaves the picture of {width}x{height} px"
-            )
+            raise TrackingError(f"the region {x} {y} {w} {h} (x y width height) leaves the picture of {width}x{height} px")
         inside = np.zeros_like(region)
         inside[y : y + h, x : x + w] = 255
         region &= inside

@@ -56,9 +56,7 @@ class Tracks:
         if self.S_gt is not None and self.gt_frames is not None:
             _check_truth(self.S_gt, self.gt_frames, points)
             if self.gt_frames[-1] >= frames:
-                raise TrackingError(
-                    f"gt_frames goes to {self.gt_frames[-1]}, but W has only the frames 0 to {frames - 1}"
-                )
+                raise TrackingError(f"gt_frames goes to {self.gt_frames[-1]}, but W has only the frames 0 to {frames - 1}")
 
     @classmethod
     def load(cls, path: Path) -> Self:
@@ -117,9 +115,7 @@ class Truth:
             raise _wrong_shape("W_px", self.W_px, "(true frames, 2, points)")
         _check_truth(self.S, self.frames, self.W_px.shape[2])
         if self.W_px.shape[0] != self.S.shape[0]:
-            raise _wrong_shape(
-                "W_px", self.W_px, f"({self.S.shape[0]}, 2, {self.S.shape[2]}) as S_gt has that many shapes"
-            )
+            raise _wrong_shape("W_px", self.W_px, f"({self.S.shape[0]}, 2, {self.S.shape[2]}) as S_gt has that many shapes")
         if not np.isfinite(self.W_px).all():
             raise TrackingError("W_px has entries that are not finite")
         _check_intrinsics(self.K)
@@ -135,9 +131,7 @@ class Truth:
         needed = ("S_gt", "gt_frames") if "W" in arrays else ("S_gt", "gt_frames", "W_px")
         missing = [name for name in needed if name not in arrays]
         if missing:
-            raise TrackingError(
-                f"{path} has no array {', '.join(missing)}, only {_names(arrays)}; truth needs them"
-            )
+            raise TrackingError(f"{path} has no array {', '.join(missing)}, only {_names(arrays)}; truth needs them")
         if "W_px" not in arrays:
             tracks = Tracks.load(path)
             assert tracks.S_gt is not None

@@ -93,7 +93,7 @@ class Video:
             self._skip_to(first)
             frame = self._read()
             if frame is None:
-                raise self._nothing_decoded()
+                raise self._nothing_left()
         except BaseException:
             self._capture.release()
             raise
@@ -110,9 +110,7 @@ class Video:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self.close()
 
     def __iter__(self) -> Iterator[Frame]:
@@ -161,9 +159,7 @@ class Video:
         # Not by seeking: containers miss the frame by up to a group of pictures.
         while self._index < first:
             if not self._grab():
-                if self._index == 0:
-                    raise self._nothing_decoded()
-                raise TrackingError(f"{self.source} ends at frame {self._index}; ask for frames before it")
+                raise self._nothing_left()
             self._index += 1
 
     def _grab(self) -> bool:
@@ -200,7 +196,9 @@ class Video:
         self._index += 1
         return frame
 
-    def _nothing_decoded(self) -> TrackingError:
+    def _nothing_left(self) -> TrackingError:
+        if self._index > 0:
+            return TrackingError(f"{self.source} ends at frame {self._index}; ask for frames before it")
         code = int(self._capture.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little", signed=True)
         codec = code.decode("ascii", "replace").strip("\0 ")
         if codec.upper() == AV1_FOURCC:
@@ -209,27 +207,21 @@ class Video:
                 f"ffmpeg -i {self.source} -c:v libx264 -crf 18 converted.mp4"
             )
         named = f" (codec {codec})" if codec.isprintable() and codec else ""
-        return TrackingError(
-            f"{self.source} has no frame that can be decoded{named}; convert it to H.264 with ffmpeg"
-        )
+        return TrackingError(f"{self.source} has no frame that can be decoded{named}; convert it to H.264 with ffmpeg")
 
 
 def _open(source: str) -> _Capture:
     if re.fullmatch(r"\d+", source):
         camera = cv2.VideoCapture(int(source))
         if not camera.isOpened():
-            raise TrackingError(
-                f"camera {source} cannot be opened; is it connected, and free of other programs?"
-            )
+            raise TrackingError(f"camera {source} cannot be opened; is it connected, and free of other programs?")
         return cast(_Capture, camera)
     if "://" not in source:
         path = Path(source)
         if re.search(r"%0?\d*d", source) and not path.exists():
             return ImageFiles(source)
         if path.is_dir():
-            raise TrackingError(
-                f"{source} is a folder; give the images in it by a pattern, as {source}/img%04d.png"
-            )
+            raise TrackingError(f"{source} is a folder; give the images in it by a pattern, as {source}/img%04d.png")
         if not path.is_file():
             raise TrackingError(f"no video file {source}; check the path")
         if not os.access(path, os.R_OK):
@@ -244,9 +236,7 @@ def _open(source: str) -> _Capture:
 def _as_bgr(image: Image) -> Image:
     """The picture as (H, W, 3) uint8, whatever depth and channels the decoder gave."""
     if image.dtype != np.uint8:
-        image = cast(
-            Image, cv2.convertScaleAbs(image, alpha=1.0 / 256.0 if image.dtype == np.uint16 else 1.0)
-        )
+        image = cast(Image, cv2.convertScaleAbs(image, alpha=1.0 / 256.0 if image.dtype == np.uint16 else 1.0))
     if image.ndim == 2 or image.shape[2] == 1:
         return cast(Image, cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))
     if image.shape[2] == 4:

@@ -116,11 +116,7 @@ def _sight_table(sheet: Surface, eye: NDArray[np.float64]) -> tuple[Floats, floa
     nearest = np.full((_TABLE, 2), (-1e6, np.inf))
     turns = np.flatnonzero(np.diff(np.sign(np.diff(slope)))) + 1
     for begin, end in zip([0, *turns], [*turns, len(slope) - 1], strict=True):
-        order = (
-            np.s_[begin : end + 1]
-            if slope[end] > slope[begin]
-            else np.s_[end : begin - 1 if begin else None : -1]
-        )
+        order = np.s_[begin : end + 1] if slope[end] > slope[begin] else np.s_[end : begin - 1 if begin else None : -1]
         seen = slope[order]
         deep = np.interp(wanted, seen, depth[order], left=np.inf, right=np.inf)
         nearer = deep < nearest[:, 1]
@@ -144,9 +140,7 @@ def _cover(sheet: Surface) -> tuple[int, int, Floats]:
         coordinate *= np.float32(_PAGE_PX_PER_MM)
         coordinate -= np.float32(0.5)
     page = _lit_page(sheet)
-    fine = cv2.remap(
-        page, x_mm, y_mm, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=(0, 0, 0, 0)
-    )
+    fine = cv2.remap(page, x_mm, y_mm, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=(0, 0, 0, 0))
     small = cv2.resize(fine, (right - left, bottom - top), interpolation=cv2.INTER_AREA)
     return int(left), int(top), small.astype(np.float32)
 

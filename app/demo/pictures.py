@@ -66,9 +66,7 @@ def landscape(page: Image, area: Box, rng: np.random.Generator) -> None:
         wide = rng.uniform(3.0, 5.5)
         block(page, (left_mm, top_mm, wide, 3.0), WHITE if rng.random() < 0.6 else OCHRE)
         block(page, (left_mm + wide * rng.uniform(0.2, 0.6), top_mm + 1.0, 1.0, 1.2), BLACK)
-        roof = np.array(
-            [(left_mm - 0.6, top_mm), (left_mm + wide / 2, top_mm - 2.6), (left_mm + wide + 0.6, top_mm)]
-        )
+        roof = np.array([(left_mm - 0.6, top_mm), (left_mm + wide / 2, top_mm - 2.6), (left_mm + wide + 0.6, top_mm)])
         polygon(page, roof, RED if rng.random() < 0.7 else BLACK)
     kites = ((33, 14, 6.5), (8, 6, 3.6), (14, 21, 3.0), (51, 8, 4.2), (58, 24, 3.4), (82, 26, 3.8))
     for right, lower, size in kites:
@@ -100,9 +98,7 @@ def city_plan(page: Image, area: Box, rng: np.random.Generator) -> None:
     cells = np.where(street[..., None], 252, pastel[squared.argmin(axis=-1)]).astype(np.uint8)
     page[top : top + height, left : left + width] = cells
     along = np.linspace(0, 1, 40)
-    river = np.column_stack(
-        [x + 1.5 + (w - 3) * along, y + h * (0.62 + 0.16 * np.sin(5 * along) - 0.2 * along)]
-    )
+    river = np.column_stack([x + 1.5 + (w - 3) * along, y + h * (0.62 + 0.16 * np.sin(5 * along) - 0.2 * along)])
     polyline(page, river, SKY, 3.2)
     named: list[NDArray[np.float64]] = []
     for place in places / PX_PER_MM + (x, y):

@@ -98,9 +98,7 @@ def test_line_of_sight_comes_back_to_the_point_it_started_from(frame: int, u: fl
 
 
 @pytest.mark.parametrize("frame", BENT)
-def test_printed_dots_appear_where_the_truth_projects_them(
-    frame: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_printed_dots_appear_where_the_truth_projects_them(frame: int, monkeypatch: pytest.MonkeyPatch) -> None:
     scale = camera._PAGE_PX_PER_MM
     page = np.full((round(HEIGHT_MM * scale), round(WIDTH_MM * scale), 4), 255, np.uint8)
     dots = np.stack(np.meshgrid(np.arange(-4, 5) * 30.0, np.arange(-3, 4) * 28.0), axis=-1).reshape(-1, 2)

@@ -1,0 +1,101 @@
+"""The command line: parsed first, so that `--help` is instant; what it needs is imported afterwards."""
+
+import contextlib
+import io
+import os
+import re
+import signal
+import sys
+from typing import Annotated, NoReturn
+
+import tyro
+
+from app.config import Demo, Evaluate, Run
+from app.errors import UsageError
+
+Command = (
+    Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+    | Annotated[Demo, tyro.conf.subcommand("demo")]
+)
+
+DESCRIPTION = """One ordinary video of a deforming surface becomes a moving 3-D mesh, live.
+
+Start with `modeshape demo`, then `modeshape run your_video.mp4 --roi X Y W H`."""
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+def main() -> NoReturn:
+    """Entry point of the `modeshape` script; exit code 2 means that something asked for cannot be done."""
+    os.environ.setdefault("RERUN_ANALYTICS", "0")
+    try:
+        sys.exit(run(parse()))
+    except ValueError as error:
+        if not is_ours(error):
+            raise
+        fail(str(error))
+    except KeyboardInterrupt:
+        sys.exit(INTERRUPTED)
+
+
+def parse() -> Run | Evaluate | Demo:
+    """The command asked for; a mistake is told in one line instead of a panel."""
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.cli(Command, prog="modeshape", description=DESCRIPTION, config=(tyro.conf.AvoidSubcommands,))
+    except SystemExit as stop:
+        if stop.code in (0, None):
+            raise
+        words = re.sub(r"\x1b\[[0-9;]*m|[│╭╮╰╯─┌┐└┘]", " ", complaint.getvalue())
+        fail(" ".join(words.split()))
+
+
+def run(command: Run | Evaluate | Demo) -> int:
+    """Carry out a command; returns the exit code."""
+    from app.progress import Progress
+    from app.summary import as_json, as_table
+
+    signal.signal(signal.SIGTERM, interrupt)
+    if isinstance(command, Evaluate):
+        from app.evaluate import evaluate
+
+        words, printed_as_json = evaluate(command, Progress()), command.json
+    elif isinstance(command, Demo):
+        from app.demo_run import demo
+
+        words, printed_as_json = demo(command), command.json
+    else:
+        from app.session import Session
+
+        words, printed_as_json = Session(command, Progress()).run(), command.output.json
+    if printed_as_json:
+        as_json(words)
+    else:
+        as_table("modeshape", words)
+        if words.get("recording"):
+            sys.stderr.write(f"look at it with: rerun {words['recording']}\n")
+    return INTERRUPTED if words.get("interrupted") else 0
+
+
+def interrupt(_signum: int, _frame: object) -> NoReturn:
+    """SIGTERM ends a run as Ctrl-C does: with everything so far kept."""
+    raise KeyboardInterrupt
+
+
+def is_ours(error: ValueError) -> bool:
+    """Whether an error names the thing and the remedy, so that a traceback would only be in the way."""
+    if isinstance(error, UsageError):
+        return True
+    from reconstruction import ReconstructionError
+    from tracking import TrackingError
+
+    return isinstance(error, ReconstructionError | TrackingError)
+
+
+def fail(text: str) -> NoReturn:
+    """One line on stderr, exit code 2."""
+    sys.stderr.write(f"error: {text}\n")
+    sys.exit(BAD_INPUT)

@@ -1,0 +1,180 @@
+"""What a person can choose; nothing heavy is imported here, so that `--help` is instant."""
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.errors import UsageError
+
+Words = dict[str, object]
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is reconstructed, and how."""
+
+    bootstrap_frames: Literal["auto"] | int = "auto"
+    """Frames the rest shape comes from; auto decides from the evidence."""
+    metric: Literal["euclidean", "manhattan"] = "euclidean"
+    """Distance between points that the modes come from: straight, or along the mesh's edges."""
+    modes: int = 20
+    """Number of modes r."""
+    deformation: Literal["auto", "bending", "stretching", "general", "inextensible"] = "auto"
+    """How the surface may deform; auto: inextensible for a flat rest shape, general for a solid one."""
+    window: int = 5
+    """Frames adjusted together."""
+    energy: Literal["anchored", "paper"] = "anchored"
+    """Anchored: tied to the past and pulled to rest. Paper: the paper's section 5 as printed (orthographic)."""
+    focal: float | None = None
+    """Focal length in pixels; without it that of the file, or the picture's width."""
+
+    def __post_init__(self) -> None:
+        if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:
+            raise UsageError(f"--bootstrap-frames {self.bootstrap_frames} is too few: give auto, or 2 and more")
+        if self.modes < 1:
+            raise UsageError(f"--modes {self.modes} is too few: give 1 and more")
+        if self.window < 1:
+            raise UsageError(f"--window {self.window} is too short: give 1 and more")
+        if self.focal is not None and not self.focal > 0:
+            raise UsageError(f"--focal {self.focal} is no focal length: give pixels, more than 0")
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where results go."""
+
+    out: Path | None = None
+    """The recording; without it recordings/NAME.rrd, numbered if that exists."""
+    overwrite: bool = False
+    """Replace existing files."""
+    tracks_out: Path | None = None
+    """Save the tracked points as .npz: W (F, 2, P), visible (F, P)."""
+    shapes_out: Path | None = None
+    """Save the shapes as .npz: S (F, 3, P) camera axes, R, s, t, Lambda, faces, visible."""
+    image: Literal["jpeg", "video", "none"] = "jpeg"
+    """How frames are stored in the recording: each as JPEG, the video file as it is, or not at all."""
+    view: bool = False
+    """Open the viewer and watch live."""
+    connect: str | None = None
+    """Address (host:port) of a running viewer to watch live in."""
+    json: bool = False
+    """Print the summary as JSON on stdout."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Reconstruct a video, frame by frame, and record it.
+
+    Examples:
+      modeshape run paper.mp4 --roi 195 95 325 265
+      modeshape run 0 --view                        # the first camera, live
+      modeshape run frames/img%04d.png --mask sheet.png --frames 10:200
+      modeshape run sheet.mp4 --focal 900 --shapes-out shapes.npz --json
+    """
+
+    source: tyro.conf.Positional[str]
+    """Video file, image pattern (img%04d.png), camera index or URL."""
+    roi: tuple[int, int, int, int] | None = None
+    """Region with the surface in the first frame: X Y WIDTH HEIGHT in pixels; without it the whole frame."""
+    mask: Path | None = None
+    """Picture of the video's size, white where the surface is in the first frame."""
+    frames: Annotated[str, tyro.conf.arg(metavar="A:B")] = ":"
+    """Frames A to B-1 of the source."""
+    points: int = 800
+    """Most points tracked."""
+    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|PATH")] = "auto"
+    """Where the rest shape comes from: the first frames (a turning object: rigid; a flat sheet: plane), or a mesh file."""
+    camera: Literal["perspective", "orthographic"] = "perspective"
+    """How the picture came about."""
+    ground_truth: Path | None = None
+    """True shapes (.npz with W_px, S_gt, gt_frames) to score against."""
+    model: tyro.conf.OmitArgPrefixes[Model] = Model()
+    output: tyro.conf.OmitArgPrefixes[Output] = Output()
+
+    def __post_init__(self) -> None:
+        if self.points < 4:
+            raise UsageError(f"--points {self.points} is too few: give 4 and more")
+
+    @property
+    def frame_range(self) -> tuple[int, int | None]:
+        """First frame, and the one after the last or None."""
+        return parse_range(self.frames)
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Reconstruct from given tracks and score against the truth in the file.
+
+    Examples:
+      modeshape evaluate tracks.npz --rest-shape first-truth --deformation bending
+      modeshape evaluate tracks.npz --missing 0.4 --seed 0 --json
+    """
+
+    tracks: tyro.conf.Positional[Path]
+    """Tracks (.npz): W (F, 2, P), visible (F, P), and K, S_gt, gt_frames where known."""
+    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|first-truth|PATH")] = "auto"
+    """Where the rest shape comes from: the first frames, the first true shape, or a mesh file."""
+    camera: Literal["auto", "perspective", "orthographic"] = "auto"
+    """Auto: perspective if the file has K, else orthographic."""
+    missing: float = 0.0
+    """Share of the entries hidden at random."""
+    noise: float = 0.0
+    """Gaussian noise, as a share of the largest distance of a point to the centroid."""
+    seed: int = 0
+    """Of the noise and the hidden entries."""
+    shapes_out: Path | None = None
+    """Save the shapes as .npz: S (F, 3, P) camera axes, R, s, t, Lambda, faces, visible."""
+    overwrite: bool = False
+    """Replace existing files."""
+    json: bool = False
+    """Print the scores as JSON on stdout."""
+    model: tyro.conf.OmitArgPrefixes[Model] = Model()
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.missing < 1:
+            raise UsageError(f"--missing {self.missing} is no share: give 0 to less than 1")
+        if self.noise < 0:
+            raise UsageError(f"--noise {self.noise} is no noise level: give 0 and more")
+        if self.seed < 0:
+            raise UsageError(f"--seed {self.seed} is no seed: give 0 and more")
+
+
+@dataclass(frozen=True)
+class Demo:
+    """Render the sample video, reconstruct it, score it against its truth and record it to recordings/demo.rrd."""
+
+    view: bool = False
+    """Open the viewer and watch live."""
+    json: bool = False
+    """Print the summary as JSON on stdout."""
+
+
+def parse_range(text: str) -> tuple[int, int | None]:
+    """`A:B` as (A, B), with 0 and None where left out.
+
+    Raises:
+        UsageError: not of that form.
+    """
+    first, colon, stop = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        a, b = int(first or 0), int(stop) if stop else None
+        if a < 0 or (b is not None and b <= a):
+            raise ValueError
+    except ValueError:
+        raise UsageError(f"--frames {text} is no range: give A:B with 0 <= A < B, for instance 0:300") from None
+    return a, b
+
+
+def as_words(config: Run | Evaluate) -> Words:
+    """The configuration as a flat dictionary, as it is stored in a recording."""
+    words = asdict(config)
+    for group in ("model", "output"):
+        words.update(words.pop(group, {}))
+    return {
+        name: list(v) if isinstance(v, tuple) else v if isinstance(v, int | float | None) else str(v)
+        for name, v in words.items()
+    }

@@ -1,0 +1,117 @@
+"""Reconstruct given tracks and score them against the truth in their file."""
+
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import Literal, cast
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from app.config import Evaluate, Words
+from app.errors import UsageError
+from app.mesh_file import rest_of_vertices
+from app.progress import Progress
+from app.results import Collected, check_free, save_shapes, score_words
+from reconstruction import rest_shape
+from reconstruction.camera import Camera
+from reconstruction.evaluation import score, with_missing, with_noise
+from reconstruction.mesh import Mesh
+from reconstruction.online import Reconstruction, Settings
+from reconstruction.rest_shape import RestShape
+from tracking.tracks import Tracks
+
+
+def evaluate(config: Evaluate, progress: Progress) -> Words:
+    """Run the reconstruction over a track file.
+
+    Returns:
+        the scores.
+
+    Raises:
+        UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
+    """
+    check_free(config.shapes_out, overwrite=config.overwrite)
+    tracks = Tracks.load(config.tracks)
+    frames, _, points = tracks.W.shape
+    rng = np.random.default_rng(config.seed)
+    W = with_noise(np.where(tracks.visible[:, None], tracks.W, np.nan), config.noise, rng)
+    visible = with_missing(tracks.visible, config.missing, rng)
+    given, mesh = given_rest_shape(config, tracks)
+    choice = config.rest_shape if given is None else "auto"
+    model = config.model
+    settings = Settings(
+        rest_shape=cast(Literal["auto", "rigid", "plane"], choice),
+        bootstrap_frames=None if model.bootstrap_frames == "auto" else model.bootstrap_frames,
+        modes=model.modes,
+        metric=model.metric,
+        deformation=model.deformation,
+        window=model.window,
+        energy=model.energy,
+    )
+    reconstruction = Reconstruction(camera_of(config, tracks), settings, given, mesh)
+    collected = Collected(everything=True)
+    with threadpool_limits(1), progress:
+        progress.expect(frames)
+        started = perf_counter()
+        estimates = []
+        for w, h in zip(W, visible, strict=True):
+            estimates += reconstruction.update(np.where(h, w, np.nan), h)
+            progress.advance(reconstruction.phase.value)
+        estimates += reconstruction.finish()
+        elapsed_ms = (perf_counter() - started) * 1e3
+    for estimate in estimates:
+        collected.add(estimate.frame, estimate)
+    rest = reconstruction.rest
+    assert rest is not None
+    if config.shapes_out:
+        save_shapes(config.shapes_out, collected.estimates, reconstruction.model)
+    words: Words = {
+        "tracks": str(config.tracks),
+        "frames": frames,
+        "points": points,
+        "modes": model.modes,
+        "rest_shape": rest.kind,
+        "rest_shape_note": rest.note,
+        "bootstrap_frames": reconstruction.bootstrap_frames,
+        "deformation": reconstruction.deformation,
+        "reprojection_rms": collected.reprojection_rms_px,
+        "ms_per_frame": elapsed_ms / frames,
+    }
+    if tracks.S_gt is not None and tracks.gt_frames is not None:
+        shapes = np.stack([collected.estimates[int(f)].shape for f in tracks.gt_frames])
+        words |= score_words(score(shapes, rest.motion.shape, tracks.S_gt, tracks.gt_frames))
+    return words
+
+
+def given_rest_shape(config: Evaluate, tracks: Tracks) -> tuple[RestShape | None, Mesh | None]:
+    """The rest shape from the truth or a file, if that is what was asked for.
+
+    Raises:
+        UsageError: the file has no truth, or the mesh does not fit.
+    """
+    if config.rest_shape in ("auto", "rigid", "plane"):
+        return None, None
+    if config.rest_shape == "first-truth":
+        if tracks.S_gt is None:
+            raise UsageError(f"{config.tracks} has no true shapes S_gt: choose another --rest-shape")
+        return rest_shape.given(tracks.S_gt[0], "truth", "first true shape"), None
+    return rest_of_vertices(Path(config.rest_shape), tracks.W.shape[2])
+
+
+def camera_of(config: Evaluate, tracks: Tracks) -> Camera:
+    """The camera asked for, from the file's K and the options.
+
+    Raises:
+        UsageError: perspective without a focal length.
+    """
+    focal, K = config.model.focal, tracks.K
+    if config.camera == "orthographic" or (config.camera == "auto" and K is None and focal is None):
+        return Camera()
+    if K is not None:
+        camera = Camera(float(K[0, 0]), K[:2, 2].copy())
+        return replace(camera, focal_px=focal) if focal else camera
+    if focal is None:
+        raise UsageError(f"{config.tracks} has no K: give --focal, or --camera orthographic")
+    seen = np.where(tracks.visible[:, None], tracks.W, np.nan)
+    return Camera(focal, np.nanmean(seen, axis=(0, 2)))

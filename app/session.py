@@ -1,0 +1,243 @@
+"""The frame loop: read, track, reconstruct, record."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from itertools import count
+from pathlib import Path
+from time import perf_counter
+from typing import Literal, cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from app.config import Run, Words, as_words
+from app.mesh_file import rest_of_surface
+from app.progress import Progress
+from app.recording import Recording
+from app.results import Collected, check_free, save_shapes, score_words
+from reconstruction.camera import Camera
+from reconstruction.model import ShapeEstimate
+from reconstruction.online import Reconstruction, Settings
+from tracking.features import detect_corners
+from tracking.klt import Observation, PointTracker
+from tracking.region import region_mask
+from tracking.tracks import Tracks, Truth
+from tracking.video import Frame, Video
+
+STAGES = ("decode", "track", "reconstruct", "record")
+RECORDINGS = Path("recordings")
+
+
+@dataclass
+class Stopwatch:
+    """Milliseconds per stage: of the current frame, and summed."""
+
+    now: dict[str, float] = field(default_factory=dict)
+    total: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
+
+    @contextmanager
+    def time(self, stage: str) -> Iterator[None]:
+        """Add the duration of the body to a stage."""
+        started = perf_counter()
+        try:
+            yield
+        finally:
+            elapsed = (perf_counter() - started) * 1e3
+            self.now[stage] = self.now.get(stage, 0.0) + elapsed
+            self.total[stage] += elapsed
+
+
+class Session:
+    """One run of the pipeline over a video.
+
+    Args:
+        config: what the person asked for.
+        progress: where to report.
+
+    Raises:
+        UsageError, TrackingError: a file or option that cannot be used.
+    """
+
+    def __init__(self, config: Run, progress: Progress) -> None:
+        self._config, self._progress = config, progress
+        output = config.output
+        for path in (output.tracks_out, output.shapes_out):
+            check_free(path, overwrite=output.overwrite)
+        self._truth = Truth.load(config.ground_truth) if config.ground_truth else None
+        truth_frames = frozenset(self._truth.frames.tolist()) if self._truth else frozenset()
+        self._collected = Collected(output.shapes_out is not None, truth_frames)
+        self._watch = Stopwatch()
+        self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
+        self._frames = 0
+        self._seen: list[float] = []
+        self._tracks: list[Observation] = []
+        self._recording_path: Path | None = None
+        self._interrupted = self._modelled = False
+        self._elapsed_s = 0.0
+
+    def run(self) -> Words:
+        """Process the whole source; an interrupt ends it early, with everything so far kept.
+
+        Returns:
+            the summary.
+
+        Raises:
+            UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
+        """
+        config = self._config
+        with threadpool_limits(1), Video(config.source, *config.frame_range) as video:
+            frames = iter(video)
+            first = next(frames)
+            self._start(first, video)
+            path = config.output.out or free_name(RECORDINGS, config.source)
+            with (
+                Recording(
+                    path,
+                    configuration=as_words(config) | {"focal_px": self._reconstruction.camera.focal_px},
+                    size=video.size,
+                    connect=config.output.connect,
+                    view=config.output.view,
+                    image=config.output.image,
+                    video=Path(config.source),
+                    overwrite=config.output.overwrite,
+                ) as recording,
+                self._progress,
+            ):
+                self._recording, self._recording_path = recording, path
+                started = perf_counter()
+                try:
+                    self._progress.expect(video.frame_count)
+                    self._loop(first, frames)
+                except KeyboardInterrupt:
+                    self._interrupted = True
+                self._settle(self._reconstruction.finish())
+                self._elapsed_s = perf_counter() - started
+                summary = self._summary()
+                recording.summary(summary)
+        self._save()
+        return summary
+
+    def _start(self, first: Frame, video: Video) -> None:
+        """Corners of the first frame, and the camera they are seen by."""
+        config = self._config
+        region = region_mask(video.size, config.roi, config.mask)
+        gray = cast(NDArray[np.uint8], cv2.cvtColor(first.image, cv2.COLOR_BGR2GRAY))
+        points_px = detect_corners(gray, region, config.points)
+        width, height = video.size
+        focal = config.model.focal or float(width)
+        camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
+        settings = Settings(
+            modes=config.model.modes,
+            metric=config.model.metric,
+            deformation=config.model.deformation,
+            window=config.model.window,
+            energy=config.model.energy,
+            bootstrap_frames=None if config.model.bootstrap_frames == "auto" else config.model.bootstrap_frames,
+        )
+        if config.rest_shape in ("auto", "rigid", "plane"):
+            settings = replace(settings, rest_shape=cast(Literal["auto", "rigid", "plane"], config.rest_shape))
+            self._reconstruction = Reconstruction(camera, settings)
+        else:
+            given, inside = rest_of_surface(Path(config.rest_shape), points_px, camera)
+            points_px = points_px[inside]
+            self._reconstruction = Reconstruction(camera, settings, given)
+        self._first_image, self._points_px = first.image, points_px
+
+    def _loop(self, first: Frame, frames: Iterator[Frame]) -> None:
+        tracker = PointTracker(first.image, self._points_px)
+        observation = Observation(self._points_px, np.ones(len(self._points_px), bool))
+        frame: Frame | None = first
+        while frame is not None:
+            if self._frames:
+                with self._watch.time("track"):
+                    observation = tracker.track(frame.image, self._reconstruction.predict())
+            self._step(frame, observation)
+            with self._watch.time("decode"):
+                frame = next(frames, None)
+
+    def _step(self, frame: Frame, observation: Observation) -> None:
+        self._times[frame.index] = frame.time_s
+        self._seen.append(float(observation.visible.mean()))
+        if self._config.output.tracks_out:
+            self._tracks.append(observation)
+        phase = self._reconstruction.phase
+        with self._watch.time("reconstruct"):
+            estimates = self._reconstruction.update(observation.points_px.T, observation.visible)
+        with self._watch.time("record"):
+            self._recording.observe(frame, observation, phase=phase.value)
+            self._settle(estimates)
+            self._recording.timing(frame.index, frame.time_s, self._watch.now)
+        self._watch.now.clear()
+        self._frames += 1
+        self._progress.advance(self._reconstruction.phase.value, self._collected.last_rms_px)
+
+    def _settle(self, estimates: list[ShapeEstimate]) -> None:
+        """Record the shapes of the oldest frames that wait for one; with the first of them, the model."""
+        if estimates and not self._modelled:
+            self._record_model()
+        for estimate in estimates:
+            index, time_s = next(iter(self._times.items()))
+            del self._times[index]
+            self._collected.add(index, estimate)
+            self._recording.estimate(index, time_s, estimate)
+
+    def _record_model(self) -> None:
+        """Everything about the model, and a word on how its rest shape was found."""
+        rest, model = self._reconstruction.rest, self._reconstruction.model
+        assert rest is not None
+        index = next(reversed(self._times))
+        self._recording.event(index, self._times[index], rest.note)
+        self._progress.say(rest.note)
+        self._recording.rest(
+            model.basis,
+            model.mesh.faces,
+            model.mesh.edges,
+            model.camera,
+            texture_bgr=self._first_image,
+            texture_px=self._points_px,
+        )
+        self._modelled = True
+
+    def _summary(self) -> Words:
+        config, rest, frames = self._config, self._reconstruction.rest, max(self._frames, 1)
+        words: Words = {
+            "source": config.source,
+            "frames": self._frames,
+            "interrupted": self._interrupted,
+            "points": len(self._points_px),
+            "rest_shape": rest.kind if rest else None,
+            "rest_shape_note": rest.note if rest else None,
+            "bootstrap_frames": self._reconstruction.bootstrap_frames,
+            "deformation": self._reconstruction.deformation,
+            "focal_px": self._reconstruction.camera.focal_px,
+            "visible_share": float(np.mean(self._seen)) if self._seen else None,
+            "visible_share_last": self._seen[-1] if self._seen else None,
+            "reprojection_rms_px": self._collected.reprojection_rms_px,
+            "fps": self._frames / self._elapsed_s if self._elapsed_s else None,
+            "stage_ms": {stage: total / frames for stage, total in self._watch.total.items()},
+        }
+        if self._truth and rest:
+            rest_points, mesh = rest.motion.shape, self._reconstruction.model.mesh
+            words |= score_words(self._collected.score_against(self._truth, rest_points, mesh))
+        return words | {"recording": str(self._recording_path)}
+
+    def _save(self) -> None:
+        output = self._config.output
+        if output.tracks_out and self._tracks:
+            W = np.stack([o.points_px.T for o in self._tracks])
+            visible = np.stack([o.visible for o in self._tracks])
+            camera = self._reconstruction.camera
+            Tracks(W, visible, K=camera.K if camera.perspective else None).save(output.tracks_out)
+        if output.shapes_out and self._collected.estimates:
+            save_shapes(output.shapes_out, self._collected.estimates, self._reconstruction.model)
+
+
+def free_name(folder: Path, source: str) -> Path:
+    """A recording's path named after its source that does not exist yet: NAME.rrd, NAME-2.rrd, …"""
+    stem = Path(source.split("?")[0]).stem.replace("%", "") or "video"
+    stem = f"camera{stem}" if source.isdigit() else stem
+    numbered = (folder / f"{stem}{f'-{n}' if n > 1 else ''}.rrd" for n in count(1))
+    return next(path for path in numbered if not path.exists())

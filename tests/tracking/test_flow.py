@@ -1,0 +1,46 @@
+import cv2
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.tracking.scene import SIZE, moved, texture
+from tracking.features import detect_corners
+from tracking.flow import follow, spread_order
+from tracking.region import region_mask
+
+
+def gray(image: np.ndarray) -> np.ndarray:
+    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
+
+
+BEFORE = gray(texture())
+POINTS = detect_corners(BEFORE, region_mask(SIZE, (60, 60, 200, 120)), 300)
+POINTS = POINTS[spread_order(POINTS)]
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.floats(-25, 25), st.floats(-25, 25))
+def test_follows_a_shift(dx: float, dy: float) -> None:
+    now = moved(BEFORE[..., None].repeat(3, axis=2), lambda p: p - [dx, dy])
+    error = np.linalg.norm(follow(BEFORE, gray(now), POINTS) - POINTS - [dx, dy], axis=1)
+    assert np.mean(error < 0.2) > 0.9
+
+
+def test_points_of_a_picture_that_is_gone_do_not_come_back() -> None:
+    there = follow(BEFORE, gray(texture(seed=1)), POINTS)
+    assert np.isnan(there[:, 0]).mean() > 0.9
+
+
+def test_no_points_and_few_points() -> None:
+    assert follow(BEFORE, BEFORE, np.empty((0, 2))).shape == (0, 2)
+    np.testing.assert_allclose(follow(BEFORE, BEFORE, POINTS[:3]), POINTS[:3], atol=0.01)
+
+
+@given(st.integers(1, 60), st.integers(0, 2**32 - 1))
+def test_every_beginning_of_the_order_is_spread(count: int, seed: int) -> None:
+    points = np.random.default_rng(seed).uniform(0, 100, (count, 2))
+    order = spread_order(points)
+    assert sorted(order) == list(range(count))
+    # The gap to the points before shrinks along the order: that is what farthest-first means.
+    gaps = [np.linalg.norm(points[order[:i]] - points[order[i]], axis=1).min() for i in range(1, count)]
+    assert all(a >= b - 1e-9 for a, b in zip(gaps, gaps[1:], strict=False))

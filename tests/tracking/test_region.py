@@ -1,0 +1,69 @@
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tracking import TrackingError
+from tracking.region import region_mask
+
+SIZE = (64, 48)
+
+
+def write(path: Path, mask: np.ndarray) -> Path:
+    cv2.imwrite(str(path), mask)
+    return path
+
+
+def test_everything_without_rectangle_and_mask() -> None:
+    region = region_mask(SIZE)
+    assert region.shape == (48, 64)
+    assert np.all(region == 255)
+
+
+def test_a_rectangle_is_x_y_width_height() -> None:
+    expected = np.zeros((48, 64), np.uint8)
+    expected[20:48, 10:40] = 255
+    np.testing.assert_array_equal(region_mask(SIZE, (10, 20, 30, 28)), expected)
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_a_mask_and_what_lies_in_both(tmp_path: Path, channels: int) -> None:
+    mask = np.zeros((48, 64), np.uint8)
+    mask[:, :32] = 255
+    picture = mask if channels == 1 else np.repeat(mask[..., None], channels, axis=2)
+    path = write(tmp_path / "mask.png", picture)
+    np.testing.assert_array_equal(region_mask(SIZE, None, path), mask)
+    both = region_mask(SIZE, (20, 0, 40, 10), path)
+    assert np.count_nonzero(both) == 12 * 10
+
+
+@pytest.mark.parametrize(
+    "roi", [(50, 0, 20, 10), (0, 40, 10, 10), (-1, 0, 5, 5), (0, -1, 5, 5), (100, 100, 5, 5), (0, 0, 0, 5)]
+)
+def test_a_rectangle_outside_the_picture(roi: tuple[int, int, int, int]) -> None:
+    with pytest.raises(TrackingError, match="leaves the picture of 64x48 px|is empty"):
+        region_mask(SIZE, roi)
+
+
+def test_masks_that_cannot_be_used(tmp_path: Path) -> None:
+    black = write(tmp_path / "black.png", np.zeros((48, 64), np.uint8))
+    other = write(tmp_path / "other.png", np.full((64, 48), 255, np.uint8))
+    left = np.zeros((48, 64), np.uint8)
+    left[:, :10] = 255
+    half = write(tmp_path / "half.png", left)
+    text, empty = tmp_path / "text.png", tmp_path / "empty.png"
+    text.write_text("no picture")
+    empty.touch()
+    table = [
+        (tmp_path / "missing.png", None, "no mask file {}"),
+        (text, None, "{} is not a picture"),
+        (empty, None, "{} is not a picture"),
+        (other, None, "{} has 48x64 px, the video 64x48"),
+        (black, None, "{} is black"),
+        (half, (30, 10, 10, 10), "{} within the region 30 10 10 10 is black"),
+    ]
+    for path, roi, says in table:
+        with pytest.raises(TrackingError, match=re.escape(says.format(path))):
+            region_mask(SIZE, roi, path)
