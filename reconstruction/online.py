@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError, rest_shape
 from reconstruction.camera import Camera, quaternion_exp, quaternion_from_rotation, quaternion_product
-from reconstruction.energy import Energy, State, evaluate, join
+from reconstruction.energy import Energy, State, join
 from reconstruction.mesh import Mesh, mesh_from_faces, triangulate
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.modes import Metric, modal_basis, principal_axes
@@ -37,6 +37,7 @@ BOOTSTRAP_SCHEDULE = (
     60,
 )  # frames after which a rigid shape is looked for; the last decides
 FEWEST_POINTS = 4
+TILT_GAIN = 0.7  # of the first frame's energy, below which another tilt is believed
 
 
 class Phase(Enum):
@@ -222,8 +223,8 @@ class SlidingWindow:
         self._frame += 1
         weights = visible.astype(np.float64)
         self._data.append(self.model.statistics(W, weights))
-        newest = self._starting_state(W, visible)
-        window = newest if self.state is None else join([self.state, newest])
+        # A new frame starts where the last one is: at constant velocity a tilt overshoots into the mirrored branch.
+        window = self._first_state(W, visible) if self.state is None else join([self.state, self.state[-1:]])
         if len(window) > self.length:
             self.before, window = window[:1], window[1:]
             self._data.pop(0)
@@ -240,19 +241,6 @@ class SlidingWindow:
         last = self.state[-1:]
         return self.model.projection(extrapolated(self.state[-2:-1], last) if len(self.state) > 1 else last).T
 
-    def _starting_state(self, W: Array, visible: Visibility) -> State:
-        """Where the newest frame starts: the best of the last frame, constant velocity and the bootstrap's pose."""
-        starts = []
-        if self.state is not None:
-            last = self.state[-1:]
-            starts.append(last)
-            if len(self.state) > 1:
-                starts.append(extrapolated(self.state[-2:-1], last))
-        if self.state is None:
-            starts.append(self._first_state(W, visible))
-        scores = [evaluate(self.energy, self._data[-1], start, self.state and self.state[-1:])[0] for start in starts]
-        return starts[int(np.argmin(scores))]
-
     def _first_state(self, W: Array, visible: Visibility) -> State:
         """Pose of the first frame with nothing deformed, from tilted hypotheses: a frontal flat sheet is a saddle."""
         motion, model = self.rest.motion, self.model
@@ -268,7 +256,8 @@ class SlidingWindow:
             q = quaternion_product(quaternion_exp(tilt), quaternion_from_rotation(motion.R[0] @ model.basis.Phi))
             start = State(q[None], t[None], np.array([log_s]), np.zeros((1, 3, 0)))
             solution = minimise(energy, data, start, None, Solver())
-            if best is None or solution.value[0] < best.value[0] * (1 - 1e-6):
+            # The rest shape's own pose, tried first, is usually right: a tilt must be clearly better.
+            if best is None or solution.value[0] < TILT_GAIN * best.value[0]:
                 best = solution
         assert best is not None
         return replace(best.state, Lambda=np.zeros((1, 3, r)))
