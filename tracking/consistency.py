@@ -12,8 +12,9 @@ Indices = NDArray[np.int64]
 NEIGHBOURS = 10  # of which a third may be wrong and six numbers are still well determined
 STIFFNESS = 0.02  # pull towards the prior map, in units of the neighbours' mean square distance
 MIN_SUPPORT = 3.0  # trusted neighbours below which nothing can be said about a point
-ROUNDS = 8  # of re-weighting
+ROUNDS = 5  # of re-weighting; 4 miss 2 % of the outliers where these are 30 % of the points, 5 miss 0.3 %
 NOISE_PX = 0.5  # least scale of disagreement: tracking noise and curvature between neighbours
+CHAOS = 0.1  # greatest scale, in neighbour distances: where all points disagree, none is excused by the others
 OUTLIER = 4.0  # scales from the neighbours' prediction
 
 
@@ -59,18 +60,25 @@ def local_motion(reference_px: Array, current_px: Array, weight: Array, neighbou
         prior: (P, 2, 2) maps to fall back on where neighbours are few or in line.
     """
     known = np.where(weight[:, None] > 0, current_px, 0.0)
-    # By what is known, not by what is trusted: else a gross outlier that upsets its neighbours would be excused.
+    # By what is known, not by what is trusted: else a gross outlier that upsets its neighbours is excused.
     support = weight[neighbours].sum(axis=1)
     judged = (weight > 0) & (support >= MIN_SUPPORT)
+    limit = CHAOS * _reach(reference_px, neighbours)
     trust = weight
     for _ in range(ROUNDS):
         affine, fitted = _fit(reference_px, known, trust, neighbours, prior)
         residual = np.linalg.norm(known - fitted, axis=1)
         scale = NOISE_PX
         if judged.any():
-            scale = max(scale, 1.4826 * float(np.median(residual[judged])))
+            scale = max(scale, min(1.4826 * float(np.median(residual[judged])), limit))
         trust = np.where(judged, weight / (1.0 + (residual / (2.0 * scale)) ** 2), weight)
     return LocalMotion(affine, fitted, support, ~judged | (residual < OUTLIER * scale))
+
+
+def _reach(reference: Array, neighbours: Indices) -> float:
+    """Median distance of the farthest neighbour."""
+    distance = np.linalg.norm(reference[neighbours] - reference[:, None], axis=2)
+    return float(np.median(distance.max(axis=1, initial=0.0)))
 
 
 def _fit(reference: Array, current: Array, weight: Array, neighbours: Indices, prior: Array) -> tuple[Array, Array]:

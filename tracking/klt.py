@@ -112,7 +112,9 @@ class PointTracker:
         # Blur makes fine patches unlike, those of the half picture much less; wrong places are unlike both.
         seen, before = seen[~clear], found.score_before[~clear]
         found = self._coarse.align(coarse, points[seen] / 2.0, motion.affine[seen], seen, REFINE_STEPS)
-        same = (before > KEEP_SCORE) | ((found.score_before > KEEP_SCORE) & (before > 0.0))
+        # Nobody vouches for a point without neighbours: it must look right by itself.
+        keep = np.where(motion.support[seen] >= MIN_SUPPORT, KEEP_SCORE, RETRIEVE_SCORE)
+        same = (before > keep) | ((found.score_before > keep) & (before > 0.0))
         points[seen[~same]] = np.nan
         blurred = found.score > BLURRED_SCORE
         self._correct(points, seen[blurred], 2.0 * found.points_px[blurred])

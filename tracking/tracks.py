@@ -40,9 +40,7 @@ class Tracks:
             raise _wrong_shape("W", self.W, "(frames, 2, points)")
         frames, _, points = self.W.shape
         if self.visible.shape != (frames, points):
-            raise _wrong_shape(
-                "visible", self.visible, f"({frames}, {points}) as W has {frames} frames and {points} points"
-            )
+            raise _wrong_shape("visible", self.visible, f"({frames}, {points}) as in W")
         bad = self.visible & ~np.isfinite(self.W).all(axis=1)
         if bad.any():
             f, p = np.argwhere(bad)[0]
@@ -115,7 +113,7 @@ class Truth:
             raise _wrong_shape("W_px", self.W_px, "(true frames, 2, points)")
         _check_truth(self.S, self.frames, self.W_px.shape[2])
         if self.W_px.shape[0] != self.S.shape[0]:
-            raise _wrong_shape("W_px", self.W_px, f"({self.S.shape[0]}, 2, {self.S.shape[2]}) as S_gt has that many shapes")
+            raise _wrong_shape("W_px", self.W_px, f"({self.S.shape[0]}, 2, {self.S.shape[2]}) as in S_gt")
         if not np.isfinite(self.W_px).all():
             raise TrackingError("W_px has entries that are not finite")
         _check_intrinsics(self.K)
@@ -131,7 +129,7 @@ class Truth:
         needed = ("S_gt", "gt_frames") if "W" in arrays else ("S_gt", "gt_frames", "W_px")
         missing = [name for name in needed if name not in arrays]
         if missing:
-            raise TrackingError(f"{path} has no array {', '.join(missing)}, only {_names(arrays)}; truth needs them")
+            raise TrackingError(f"{path} is no truth: no array {', '.join(missing)}, only {_names(arrays)}")
         if "W_px" not in arrays:
             tracks = Tracks.load(path)
             assert tracks.S_gt is not None

@@ -56,16 +56,16 @@ def test_an_affine_motion_is_recovered(seed: int) -> None:
     assert motion.consistent.all()
 
 
-@given(seeds)
-def test_scattered_outliers_are_told_from_a_bent_surface(seed: int) -> None:
+@given(seeds, st.floats(0.0, 0.2))
+def test_scattered_outliers_are_told_from_a_bent_surface(seed: int, share: float) -> None:
     rng = np.random.default_rng(seed)
     points = grid()
     now = bent(points) + rng.normal(0, 0.15, points.shape)
-    wrong = rng.random(len(points)) < 0.1
+    wrong = rng.random(len(points)) < share
     angle = rng.uniform(0, 2 * np.pi, int(wrong.sum()))
     now[wrong] += rng.uniform(5, 40, (len(angle), 1)) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     motion = local_motion(points, now, np.ones(len(points)), nearest_neighbours(points), identity(len(points)))
-    assert motion.consistent[wrong].mean() < 0.1 if wrong.any() else True
+    assert np.count_nonzero(motion.consistent[wrong]) <= 0.2 * np.count_nonzero(wrong)
     assert motion.consistent[~wrong].mean() > 0.97
 
 
@@ -85,7 +85,7 @@ def test_unknown_points_are_placed_by_their_neighbours() -> None:
 def test_without_support_nothing_is_said() -> None:
     points = np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]])
     for weight in (np.ones(3), np.zeros(3)):
-        motion = local_motion(points, points + [100.0, 0], weight, nearest_neighbours(points), identity(3))
+        motion = local_motion(points, points + 100.0, weight, nearest_neighbours(points), identity(3))
         assert motion.consistent.all()
         assert np.isfinite(motion.affine).all()
 

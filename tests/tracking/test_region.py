@@ -43,7 +43,7 @@ def test_a_mask_and_what_lies_in_both(tmp_path: Path, channels: int) -> None:
     "roi", [(50, 0, 20, 10), (0, 40, 10, 10), (-1, 0, 5, 5), (0, -1, 5, 5), (100, 100, 5, 5), (0, 0, 0, 5)]
 )
 def test_a_rectangle_outside_the_picture(roi: tuple[int, int, int, int]) -> None:
-    with pytest.raises(TrackingError, match="leaves the picture of 64x48 px|is empty"):
+    with pytest.raises(TrackingError, match="leaves the picture of 64x48 px"):
         region_mask(SIZE, roi)
 
 
