@@ -22,7 +22,7 @@ from app import entities
 from app.blueprint import LAMBDA_RGB, LOST_RGB, PREDICTED_RGB, SEEN_RGB, SPECTRUM_RGB, WIREFRAME_RGBA
 from app.errors import UsageError
 from app.picture import cropped, embedded_video, jpeg, texture
-from app.stream import Stream, claim
+from app.stream import Stream, check_writable
 from app.viewer import running_viewer, spawned_viewer
 from app.wireframe import edge_strips, line_strips
 from reconstruction.camera import Camera
@@ -83,7 +83,7 @@ class Recording:
         if image == "video":
             asset, self._video_ns = embedded_video(video)
         if path is not None:
-            claim(path, overwrite=overwrite)
+            check_writable(path, overwrite=overwrite)
         if view:
             urls.append(spawned_viewer())
         self._stream = Stream(path, urls)

@@ -10,6 +10,7 @@ from app import entities
 from app.blueprint import blueprint
 from app.errors import UsageError
 
+FLUSH_SECONDS = 10.0  # a viewer that hangs must not stop a run
 FULL_BYTES = 2**20  # so little left on a disk explains a failure
 
 Loggable = rr.AsComponents | Iterable[rr.DescribedComponentBatch]
@@ -73,7 +74,7 @@ class Stream:
         if self._stream is None:
             return
         try:
-            self._stream.flush()
+            self._stream.flush(timeout_sec=FLUSH_SECONDS)
         except RuntimeError as error:
             if "gRPC" not in str(error):
                 raise self._failure(error) from error
@@ -97,7 +98,7 @@ class Stream:
         return UsageError(f"cannot write {self._path}: {reason}; choose another place with --out")
 
 
-def claim(path: Path, *, overwrite: bool) -> None:
+def check_writable(path: Path, *, overwrite: bool) -> None:
     """Make sure that a file can be written, creating its folder, before anything is computed.
 
     Raises:
@@ -105,7 +106,11 @@ def claim(path: Path, *, overwrite: bool) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.open("ab" if overwrite else "xb").close()
+        if overwrite and path.exists():
+            path.open("ab").close()
+        else:
+            path.open("xb").close()
+            path.unlink()
     except FileExistsError as error:
         raise UsageError(f"{path} exists: replace it with --overwrite, or choose another with --out") from error
     except OSError as error:

@@ -7,6 +7,7 @@ from urllib.parse import urlsplit
 import rerun as rr
 import rerun_cli  # type: ignore[import-untyped]
 
+from app import entities
 from app.errors import UsageError
 
 PORT = 9876
@@ -19,19 +20,16 @@ def running_viewer(address: str) -> str:
     Raises:
         UsageError: not an address, or nobody listens there.
     """
-    url = address if "://" in address else f"rerun+http://{address}/proxy"
+    parts = urlsplit(address if "://" in address else f"rerun+http://{address}")
     try:
-        parts = urlsplit(url)
         host, port = parts.hostname, parts.port or PORT
     except ValueError:
         host = None
     if host is None or not parts.scheme.startswith("rerun"):
-        raise UsageError(f"--connect {address} is no viewer's address: give host:port, for instance 127.0.0.1:{PORT}")
-    try:  # Rerun itself would wait 5 seconds, and then go on without a viewer
-        socket.create_connection((host, port), timeout=TIMEOUT_S).close()
-    except OSError as error:
-        raise UsageError(f"no Rerun viewer answers at {host}:{port}: start one with `rerun`, or use --view") from error
-    return f"{parts.scheme}://{parts.netloc if parts.port else f'{parts.netloc}:{port}'}{parts.path or '/proxy'}"
+        raise UsageError(f"--connect {address} is no viewer's address: give host:port, like 127.0.0.1:{PORT}")
+    if not listening(host, port):  # Rerun itself would wait 5 seconds, and go on without a viewer
+        raise UsageError(f"no viewer answers at {host}:{port}: start one with `rerun`, or use --view")
+    return f"{parts.scheme}://{host}:{port}/proxy"
 
 
 def spawned_viewer() -> str:
@@ -40,9 +38,28 @@ def spawned_viewer() -> str:
     Raises:
         UsageError: it does not start.
     """
-    program = Path(rerun_cli.__file__).with_name("rerun")  # of this very version, whatever is on PATH
-    try:
-        rr.spawn(port=PORT, connect=False, hide_welcome_screen=True, executable_path=str(program))
-    except RuntimeError as error:
-        raise UsageError(f"the viewer does not start ({error}): leave out --view and open the file later") from error
+    if not listening("127.0.0.1", PORT):
+        program = Path(rerun_cli.__file__).with_name("rerun")  # of this very version, whatever is on PATH
+        stream = rr.RecordingStream(entities.APPLICATION)  # only because spawning asks for one
+        try:
+            rr.spawn(
+                port=PORT,
+                connect=False,
+                hide_welcome_screen=True,
+                executable_path=str(program),
+                recording=stream,
+            )
+        except RuntimeError as error:
+            raise UsageError(f"--view: the viewer does not start: {error}") from error
+        if not listening("127.0.0.1", PORT):
+            raise UsageError("--view: the viewer does not start (is there a screen?); open the file later")
     return f"rerun+http://127.0.0.1:{PORT}/proxy"
+
+
+def listening(host: str, port: int) -> bool:
+    """Whether somebody accepts connections there."""
+    try:
+        socket.create_connection((host, port), timeout=TIMEOUT_S).close()
+    except OSError:
+        return False
+    return True
