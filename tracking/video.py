@@ -203,7 +203,7 @@ class Video:
         codec = code.decode("ascii", "replace").strip("\0 ")
         if codec.upper() == AV1_FOURCC:
             return TrackingError(
-                f"{self.source} is AV1 video, which OpenCV's decoder does not support; convert it: "
+                f"{self.source} is AV1 video, which OpenCV {cv2.__version__} does not decode; convert it: "
                 f"ffmpeg -i {self.source} -c:v libx264 -crf 18 converted.mp4"
             )
         named = f" (codec {codec})" if codec.isprintable() and codec else ""

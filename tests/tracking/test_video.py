@@ -126,7 +126,6 @@ def test_an_error_while_iterating_ends_the_decoding_thread(movie: Path) -> None:
         ("missing.mp4", None, "no video file {}; check the path"),
         ("text.mp4", b"this is not a video\n" * 9, "{} cannot be decoded"),
         ("empty.mp4", b"", "{} cannot be decoded"),
-        ("av1.mp4", AV1.read_bytes(), "{} is AV1 video"),
         ("img%04d.png", None, "no image file matches {}"),
         ("nowhere/img%04d.png", None, "no image file matches {}"),
     ],
@@ -140,9 +139,18 @@ def test_names_a_source_that_cannot_be_read(tmp_path: Path, name: str, content: 
     assert "\n" not in str(error.value)
 
 
-def test_av1_is_told_how_to_convert(tmp_path: Path) -> None:
-    with pytest.raises(TrackingError, match=r"ffmpeg -i .*av1\.mp4 -c:v libx264"):
-        Video(str(AV1))
+def test_av1_is_read_or_told_how_to_convert() -> None:
+    """The FFmpeg in OpenCV 5.0.0's wheel has no AV1 decoder, the one in 4.14.0's has."""
+    if cv2.VideoCapture(str(AV1)).read()[0]:
+        found = frames(AV1)
+        assert [f.index for f in found] == [0, 1]
+        assert abs(float(found[1].image.mean()) - 128) < 3
+    else:
+        with pytest.raises(TrackingError, match=r"av1\.mp4 is AV1 video.*ffmpeg -i .*av1\.mp4 -c:v libx264"):
+            Video(str(AV1))
+
+
+def test_a_folder_and_an_absent_camera(tmp_path: Path) -> None:
     with pytest.raises(TrackingError, match="is a folder"):
         Video(str(tmp_path))
     with pytest.raises(TrackingError, match="camera 97 cannot be opened"):
