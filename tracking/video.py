@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -204,7 +205,7 @@ class Video:
         if codec.upper() == AV1_FOURCC:
             return TrackingError(
                 f"{self.source} is AV1 video, which OpenCV {cv2.__version__} does not decode; convert it: "
-                f"ffmpeg -i {self.source} -c:v libx264 -crf 18 converted.mp4"
+                f"ffmpeg -i {shlex.quote(self.source)} -c:v libx264 -crf 18 converted.mp4"
             )
         named = f" (codec {codec})" if codec.isprintable() and codec else ""
         return TrackingError(f"{self.source} has no frame that can be decoded{named}; convert it to H.264 with ffmpeg")
