@@ -4,18 +4,6 @@ import rerun.blueprint as rrb
 
 from app import entities
 
-SEEN_RGB = (64, 224, 128)
-PREDICTED_RGB = (255, 176, 0)
-LOST_RGB = (255, 48, 96)
-WIREFRAME_RGBA = (120, 200, 255, 80)
-SPECTRUM_RGB = (150, 160, 255)
-LAMBDA_RGB = (
-    ((40, 120, 255), (100, 160, 255), (160, 200, 255)),
-    ((0, 160, 110), (60, 200, 150), (140, 230, 190)),
-    ((255, 130, 0), (255, 170, 80), (255, 210, 150)),
-)
-"""Leading modes of Γ_α, Γ_β, Γ_τ: a row of Λ has a hue, higher modes are paler."""
-
 
 def blueprint() -> rrb.Blueprint:
     """Mesh on the left, video with points and wireframe on the right, plots and texts below it.

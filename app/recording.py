@@ -19,9 +19,9 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from app import entities
-from app.blueprint import LAMBDA_RGB, LOST_RGB, PREDICTED_RGB, SEEN_RGB, SPECTRUM_RGB, WIREFRAME_RGBA
 from app.errors import UsageError
 from app.picture import cropped, embedded_video, jpeg, texture
+from app.scenery import LEADING, coefficient_styles, placement, styles
 from app.stream import Stream, check_writable
 from app.viewer import running_viewer, spawned_viewer
 from app.wireframe import edge_strips, line_strips
@@ -35,7 +35,6 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FLUSH_FRAMES = 100  # a full disk is noticed, and a killed run keeps its past, to within so many frames
-LEADING = 3  # entries per row of Λ that are plotted over time
 NOWHERE = np.empty((0, 2))
 
 
@@ -77,7 +76,7 @@ class Recording:
         self._strips: list[Indices] = []
         self._camera = Camera()
         self._placed = False
-        self._styled: set[str] = set()
+        self._stages: set[str] = set()
 
         urls = [running_viewer(connect)] if connect else []
         if image == "video":
@@ -90,7 +89,7 @@ class Recording:
         if path is not None:
             self._stream.name(path.stem)
         self._document(entities.CONFIGURATION, "Configuration", configuration)
-        self._scene()
+        self._stream.static(styles())
         if image == "video":
             self._stream.log(entities.IMAGE, asset, static=True)
 
@@ -158,16 +157,7 @@ class Recording:
         )
         self._stream.log(entities.MESH, texture(crop, texture_px - origin, faces), static=True)
         self._camera = camera
-        modes = len(basis.eigenvalues)
-        shown = min(LEADING, modes)
-        names = [f"{row}{k + 1}" for row in "αβτ" for k in range(shown)]
-        colors = [color for row in LAMBDA_RGB for color in row[:shown]]
-        self._style(entities.LEADING, rr.SeriesLines(names=names, colors=colors))
-        # Bars in three groups. Rerun refuses a BarChart without values; static ones would hide every frame.
-        places = np.arange(3 * modes) + np.repeat(np.arange(3) * max(1, modes // 5), modes)
-        abscissa = rr.components.TensorDataBatch(places).described(rr.BarChart.descriptor_abscissa())
-        color = rr.components.ColorBatch(SPECTRUM_RGB).described(rr.BarChart.descriptor_color())
-        self._stream.log(entities.SPECTRUM, [abscissa, color], static=True)
+        self._stream.static(coefficient_styles(len(basis.eigenvalues)))
 
     def estimate(self, index: int, time_s: float, estimate: ShapeEstimate) -> None:
         """One frame's shape and pose."""
@@ -175,7 +165,9 @@ class Recording:
             return
         self._stream.at(index, time_s)
         vertices, projection = estimate.shape.T, estimate.projection_px.astype(np.float32)
-        self._place(vertices)
+        if not self._placed:
+            self._stream.static(placement(vertices, self._camera, self._size))
+            self._placed = True
         self._stream.values(
             entities.ESTIMATE,
             "Estimate",
@@ -201,7 +193,9 @@ class Recording:
         self._stream.at(index, time_s)
         for stage, milliseconds in stage_ms.items():
             entity = f"{entities.TIMING}/{stage}"
-            self._style(entity, rr.SeriesLines(names=stage))
+            if stage not in self._stages:
+                self._stages.add(stage)
+                self._stream.log(entity, rr.SeriesLines(names=stage), static=True)
             self._stream.log(entity, rr.Scalars(milliseconds))
 
     def event(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:
@@ -235,48 +229,8 @@ class Recording:
             if error is None:  # what ended the run matters more
                 raise
 
-    def _scene(self) -> None:
-        for entity in ("/", entities.WORLD):
-            self._stream.log(entity, rr.ViewCoordinates.RDF, static=True)
-        kinds = [(entities.SEEN, SEEN_RGB), (entities.PREDICTED, PREDICTED_RGB), (entities.LOST, LOST_RGB)]
-        classes = [(k, entity.rsplit("/", 1)[1], color) for k, (entity, color) in enumerate(kinds, start=1)]
-        self._stream.log("/", rr.AnnotationContext(classes), static=True)
-        for k, (entity, _) in enumerate(kinds, start=1):
-            # A negative radius is in points of the screen: the same size at every zoom.
-            points = rr.Points2D.from_fields(class_ids=k, radii=-2.0, draw_order=30 + k)
-            self._stream.log(entity, points, static=True)
-        lines = rr.LineStrips2D.from_fields(colors=[WIREFRAME_RGBA], radii=-0.5, draw_order=20)
-        self._stream.log(entities.WIREFRAME, lines, static=True)
-        self._style(entities.ERROR, rr.SeriesLines(names=["RMS", "median"], colors=[LOST_RGB, PREDICTED_RGB]))
-        self._style(entities.VISIBLE, rr.SeriesLines(names="seen", colors=SEEN_RGB))
-
-    def _place(self, vertices: Array) -> None:
-        """Move the scene so that the first shape (p, 3) has unit size at the origin: there the eye looks."""
-        if self._placed:
-            return
-        self._placed = True
-        center = vertices.mean(axis=0)
-        scale = 1.0 / max(float(np.sqrt(np.mean(np.sum((vertices - center) ** 2, axis=1)))), 1e-9)
-        moved = -scale * center
-        self._stream.log(entities.MESH, rr.Transform3D(translation=moved, scale=scale), static=True)
-        if self._camera.perspective:
-            # The viewer has no scaled cameras, and needs none: at the moved place the camera sees the same.
-            pinhole = rr.Pinhole(
-                image_from_camera=self._camera.K,
-                resolution=self._size,
-                camera_xyz=rr.ViewCoordinates.RDF,
-                image_plane_distance=0.25 * scale * self._camera.focal_px,
-            )
-            self._stream.log(entities.CAMERA, pinhole, static=True)
-            self._stream.log(entities.CAMERA, rr.Transform3D(translation=moved), static=True)
-
     def _points(self, entity: str, points_px: NDArray[np.floating]) -> None:
         self._stream.log(entity, rr.Points2D.from_fields(positions=points_px.astype(np.float32)))
-
-    def _style(self, entity: str, style: rr.SeriesLines) -> None:
-        if entity not in self._styled:
-            self._styled.add(entity)
-            self._stream.log(entity, style, static=True)
 
     def _document(self, entity: str, title: str, values: Mapping[str, object]) -> None:
         release = version("modeshape")

@@ -60,6 +60,11 @@ class Stream:
         if self._stream is not None:
             self._stream.log(entity, what, static=static)
 
+    def static(self, entries: Iterable[tuple[str, Loggable]]) -> None:
+        """Write what holds for the whole recording."""
+        for entity, what in entries:
+            self.log(entity, what, static=True)
+
     def values(self, entity: str, archetype: str, *, static: bool = False, **components: object) -> None:
         """Write components of our own, at full precision; viewers do not draw them, programs read them."""
         named = rr.DynamicArchetype(f"{entities.APPLICATION}.{archetype}", components=components)
