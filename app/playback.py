@@ -1,0 +1,308 @@
+"""A recording as data again: what `modeshape review`, `retexture` and `export` work from.
+
+What is written where is listed in `app.entities`.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Self, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app import entities
+from app.chunks import STATIC, RecordingFile, Rows
+from app.errors import UsageError
+from app.stored_images import stored_images
+from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.energy import State
+from reconstruction.mesh import Mesh
+from reconstruction.model import Model, ShapeEstimate
+from reconstruction.modes import ModalBasis
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+MODEL = "modeshape.Model:"
+ESTIMATE = "modeshape.Estimate:"
+OBSERVATION = "modeshape.Observation:"
+DOCUMENT = "modeshape.Document:"
+POSITIONS = "Points2D:positions"
+SCALARS = "Scalars:scalars"
+NAME = ("__properties", "RecordingInfo:name")
+TEXTURE = "Mesh3D:albedo_texture_"
+
+
+@dataclass(frozen=True)
+class Modelled:
+    """The part of a recording that is there once the bootstrap is over.
+
+    Attributes:
+        model: rest shape, modes, mesh and camera.
+        size: (width, height) of the picture, px.
+        texture_px: (P, 2) the vertices in the first frame.
+        texture_bgr: (h, w, 3) the part of the first frame that they cover.
+        texture_origin: (2,) px of that part in the frame.
+    """
+
+    model: Model
+    size: tuple[int, int]
+    texture_px: Array
+    texture_bgr: Image
+    texture_origin: NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Playback:
+    """A recording; F frames, P points, r modes.
+
+    Attributes:
+        path: its file.
+        name: what viewers call it.
+        version: of the modeshape that wrote it.
+        configuration: what the run was asked to do.
+        summary: what came out of the run; None if it was cut off.
+        notes: what is missing in the recording, in words for a person; usually none.
+        frames: (F,) numbers of the frames in their source.
+        times_s: (F,) their times.
+        phases: (F) phase of the run at each.
+        stage_ms: by stage, (F,) milliseconds, NaN where there are none.
+        events: (frame, time_s, level, text) of what happened.
+        W: (F, 2, P) observed px, NaN where not visible.
+        visible: (F, P) whether a point was seen.
+        quaternion: (F, 4) w first; NaN in frames without a shape, as for all that follow.
+        t: (F, 2) px.
+        s: (F,).
+        Lambda: (F, 3, r) px; r = 0 without a model.
+        modelled: what is known once the bootstrap is over; None if the run ended before.
+    """
+
+    path: Path
+    name: str
+    version: str
+    configuration: dict[str, object]
+    summary: dict[str, object] | None
+    notes: tuple[str, ...]
+    frames: NDArray[np.int64]
+    times_s: Array
+    phases: list[str]
+    stage_ms: dict[str, Array]
+    events: list[tuple[int, float, str, str]]
+    W: Array
+    visible: NDArray[np.bool_]
+    quaternion: Array
+    t: Array
+    s: Array
+    Lambda: Array
+    modelled: Modelled | None
+    file: RecordingFile
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read a recording: complete, of a run that was killed, or cut off.
+
+        Raises:
+            UsageError: it is missing, not a recording, not one of ours, or without a single frame.
+        """
+        file = RecordingFile(path)
+        try:
+            return cls._of(file)
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            if isinstance(error, UsageError):
+                raise
+            raise UsageError(
+                f"{path} is not a recording that this version of modeshape can read ({error!r}): run again to make one"
+            ) from error
+
+    @classmethod
+    def _of(cls, file: RecordingFile) -> Self:
+        rows = file.rows(wanted)
+        observed = rows.last(entities.OBSERVATION, f"{OBSERVATION}visible")
+        seen = rows.last(entities.SEEN, POSITIONS)
+        phases = rows.last(entities.OBSERVATION, f"{OBSERVATION}phase")
+        numbers = sorted(observed.keys() & seen.keys() & phases.keys())  # what was cut off may have one without another
+        if not numbers:
+            raise UsageError(f"{file.path} contains no frame: the run ended before its first, or its start was lost")
+        visible = np.stack([cast(NDArray[np.bool_], observed[k].value) for k in numbers])
+        points = np.full((*visible.shape, 2), np.nan)
+        points[visible] = np.concatenate([cast(Array, seen[k].value) for k in numbers])
+        modelled = modelled_part(rows)
+        modes = len(modelled.model.basis.eigenvalues) if modelled else 0
+
+        def by_frame(entity: str, component: str, width: int) -> Array:
+            values, found = np.full((len(numbers), width), np.nan), rows.last(entity, component)
+            for i, frame in enumerate(numbers):
+                if frame in found:
+                    values[i] = cast(Array, found[frame].value)
+            return values
+
+        def document(entity: str) -> tuple[dict[str, object] | None, str]:
+            texts = rows.last(entity, f"{DOCUMENT}json")
+            if STATIC not in texts:
+                return None, "unknown"
+            version = cast(list[str], rows.static(entity, f"{DOCUMENT}version"))[0]
+            return json.loads(cast(list[str], texts[STATIC].value)[0]), version
+
+        configuration, version = document(entities.CONFIGURATION)
+        summary = document(entities.SUMMARY)[0]
+        notes = []
+        if file.cut_off:
+            notes.append(f"{file.path} is cut off: {len(numbers)} frames, up to number {numbers[-1]}, could be read")
+        elif summary is None:
+            notes.append(f"{file.path} is of a run that was ended before it was complete: it has no summary")
+        if modelled is None:
+            notes.append(f"{file.path} contains no shapes: the run ended before its rest shape was found")
+        stages = [e for e, c in rows.found if e.startswith(f"{entities.TIMING}/") and c == SCALARS]
+        texts = {row.id: cast(list[str], row.value)[0] for row in rows.all(entities.EVENTS, "TextLog:text")}
+        levels = {row.id: cast(list[str], row.value)[0] for row in rows.all(entities.EVENTS, "TextLog:level")}
+        names = rows.last(*NAME)
+        return cls(
+            path=file.path,
+            name=cast(list[str], names[STATIC].value)[0] if STATIC in names else file.path.stem,
+            version=version,
+            configuration=configuration or {},
+            summary=summary,
+            notes=tuple(notes),
+            frames=np.array(numbers, np.int64),
+            times_s=np.array([observed[k].time_s for k in numbers]),
+            phases=[cast(list[str], phases[k].value)[0] for k in numbers],
+            stage_ms={entity.split("/", 1)[1]: by_frame(entity, SCALARS, 1)[:, 0] for entity in stages},
+            events=[
+                (row.frame, row.time_s, levels.get(row.id, "INFO"), texts[row.id])
+                for row in rows.all(entities.EVENTS, "TextLog:text")
+            ],
+            W=points.transpose(0, 2, 1).copy(),
+            visible=visible,
+            quaternion=by_frame(entities.ESTIMATE, f"{ESTIMATE}quaternion", 4),
+            t=by_frame(entities.ESTIMATE, f"{ESTIMATE}t", 2),
+            s=by_frame(entities.ESTIMATE, f"{ESTIMATE}s", 1)[:, 0],
+            Lambda=by_frame(entities.ESTIMATE, f"{ESTIMATE}Lambda", 3 * modes).reshape(-1, 3, modes),
+            modelled=modelled,
+            file=file,
+        )
+
+    def need_model(self) -> Model:
+        """Rest shape, modes, mesh and camera together.
+
+        Raises:
+            UsageError: the run ended before there was a model.
+        """
+        return self._need().model
+
+    @property
+    def basis(self) -> ModalBasis:
+        """Rest shape and modes; this and the following raise UsageError if the run ended before there was a model."""
+        return self._need().model.basis
+
+    @property
+    def mesh(self) -> Mesh:
+        """Connectivity of the points."""
+        return self._need().model.mesh
+
+    @property
+    def camera(self) -> Camera:
+        """The camera."""
+        return self._need().model.camera
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of the picture, px."""
+        return self._need().size
+
+    @property
+    def texture_px(self) -> Array:
+        """The vertices (P, 2) px in the first frame."""
+        return self._need().texture_px
+
+    @property
+    def texture_bgr(self) -> Image:
+        """The part (h, w, 3) of the first frame that the vertices cover."""
+        return self._need().texture_bgr
+
+    @property
+    def texture_origin(self) -> NDArray[np.int64]:
+        """Where (2,) px that part is in the first frame."""
+        return self._need().texture_origin
+
+    @cached_property
+    def shaped(self) -> NDArray[np.bool_]:
+        """Which frames (F,) have a shape."""
+        return np.asarray(np.isfinite(self.s))
+
+    def estimate(self, i: int) -> ShapeEstimate | None:
+        """Shape and pose of the frame in row i; None if it has none.
+
+        Raises:
+            UsageError: the run ended before there was a model.
+        """
+        model = self.need_model()
+        if not self.shaped[i]:
+            return None
+        q = quaternion_from_rotation(rotation_from_quaternion(self.quaternion[i]) @ model.basis.Phi)
+        t, log_s = self.t[i] / model.radius, np.log(self.s[i])
+        state = State(q[None], t[None], np.array([log_s]), self.Lambda[i][None] / model.unit)
+        return model.estimate(i, self.W[i], self.visible[i], state)
+
+    def shapes(self) -> Array:
+        """All shapes (F, 3, P) in camera axes, pixels of the first frame; NaN in frames without one.
+
+        Raises:
+            UsageError: the run ended before there was a model.
+        """
+        shapes = np.full((len(self.frames), 3, self.basis.rest.shape[1]), np.nan)
+        for i in np.flatnonzero(self.shaped):
+            estimate = self.estimate(int(i))
+            assert estimate is not None
+            shapes[i] = estimate.shape
+        return shapes
+
+    def images(self) -> Iterator[tuple[int, Image | None]]:
+        """Row and picture (H, W, 3) BGR of every frame, decoded one at a time; None where there is none."""
+        return stored_images(self.file, self.frames.tolist())
+
+    def _need(self) -> Modelled:
+        if self.modelled is None:
+            raise UsageError(
+                f"{self.path} contains no model: the run ended before its rest shape was found; "
+                "run again for longer, or with --rest-shape plane"
+            )
+        return self.modelled
+
+
+def wanted(entity: str, component: str) -> bool:
+    """What is kept in memory: everything but pictures and what the estimates are drawn with."""
+    if entity == entities.MESH:
+        return component.startswith(TEXTURE)
+    if entity == entities.SEEN:
+        return component == POSITIONS
+    if entity.startswith(entities.TIMING):
+        return component == SCALARS
+    ours = (MODEL, ESTIMATE, OBSERVATION, DOCUMENT, "TextLog:")
+    return (entity, component) == NAME or component.startswith(ours)
+
+
+def modelled_part(rows: Rows) -> Modelled | None:
+    """Model and texture, or None if the recording does not have both."""
+    if not rows.last(entities.MODEL, f"{MODEL}rest") or not rows.last(entities.MESH, f"{TEXTURE}buffer"):
+        return None
+
+    def value(name: str) -> Array:
+        return cast(Array, rows.static(entities.MODEL, f"{MODEL}{name}"))
+
+    rest = value("rest").reshape(3, -1)
+    basis = ModalBasis(rest, value("Upsilon").reshape(-1, rest.shape[1]), value("eigenvalues"), value("Phi").reshape(3, 3))
+    faces, edges = (value(name).reshape(-1, width).astype(np.int64) for name, width in (("faces", 3), ("edges", 2)))
+    camera = Camera(float(value("focal_px")[0]), value("center_px"))
+    layout = cast(list[dict[str, int]], rows.static(entities.MESH, f"{TEXTURE}format"))[0]
+    rgb = np.frombuffer(cast(bytes, rows.static(entities.MESH, f"{TEXTURE}buffer")), np.uint8)
+    width, height = value("size").astype(int).tolist()
+    return Modelled(
+        model=Model(basis, Mesh(faces, edges), camera),
+        size=(width, height),
+        texture_px=value("texture_px").reshape(-1, 2),
+        texture_bgr=rgb.reshape(layout["height"], layout["width"], 3)[:, :, ::-1].copy(),
+        texture_origin=value("texture_origin").astype(np.int64),
+    )
