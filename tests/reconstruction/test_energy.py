@@ -1,0 +1,273 @@
+"""Each term of the energy: analytic derivatives against finite differences, blocks against the residuals' Jacobian."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from reconstruction import statistics
+from reconstruction.energy import (
+    HAT,
+    POSE,
+    Energy,
+    State,
+    edge_strain,
+    edge_vectors,
+    evaluate,
+    join,
+    linearise,
+    quaternion_difference,
+    smoothness,
+)
+from reconstruction.model import Model
+from reconstruction.statistics import Statistics
+from tests.reconstruction.world import (
+    CAMERAS,
+    ORTHOGRAPHIC,
+    SEEDS,
+    model_of,
+    random_state,
+    relief,
+    statistics_of,
+    unit_quaternions,
+)
+
+FRAMES, MODES, POINTS = 3, 3, 25
+SILENT = Energy(rotation=0.0, translation=0.0, scale=0.0, deformation=0.0, rest=0.0)
+ROWS = st.sampled_from([(0, 1, 2), (2,), (0, 1), ()])
+
+
+@dataclass
+class Scene:
+    """A window of frames with data that fit it badly."""
+
+    model: Model
+    W: np.ndarray
+    weights: np.ndarray
+    data: Statistics
+    state: State
+    before: State
+
+
+def scene_of(rng: np.random.Generator, camera=ORTHOGRAPHIC) -> Scene:  # type: ignore[no-untyped-def]
+    model = model_of(relief(rng, POINTS), camera, MODES)
+    W = 80 * rng.normal(size=(FRAMES, 2, POINTS)) + camera.center_px[:, None]
+    weights = np.where(rng.random((FRAMES, POINTS)) < 0.7, rng.random((FRAMES, POINTS)), 0.0)
+    chain = random_state(rng, FRAMES + 1, MODES)
+    return Scene(model, W, weights, statistics_of(model, W, weights), chain[1:], chain[:1])
+
+
+def nothing_seen(scene: Scene) -> Statistics:
+    """Data terms that are zero, so that another term stands alone."""
+    return statistics_of(scene.model, scene.W, np.zeros_like(scene.weights))
+
+
+def terms(scene: Scene) -> dict[str, Energy]:
+    """Energies of one prior each."""
+    edges = scene.model.coarse_edges(12)
+    return {
+        "rotation": replace(SILENT, rotation=0.7),
+        "translation": replace(SILENT, translation=0.4),
+        "scale": replace(SILENT, scale=0.6),
+        "deformation": replace(SILENT, deformation=0.3),
+        "rest": replace(SILENT, rest=0.9),
+        "inextensibility": replace(SILENT, inextensibility=2.0, edges=edges),
+    }
+
+
+def everything(scene: Scene, rows: tuple[int, ...], *, tied: bool) -> Energy:
+    return Energy(0.7, 0.4, 0.6, 0.3, 0.9, 2.0, rows=rows, tied=tied, edges=scene.model.coarse_edges(12))
+
+
+def check_gradient(energy: Energy, data: Statistics, scene: Scene, rng: np.random.Generator) -> None:
+    """Half the directional derivative, in random directions and along each parameter of the middle frame."""
+    state = scene.state
+    if not energy.rows:
+        state = replace(state, Lambda=np.zeros((FRAMES, 3, 0)))
+        data = Statistics(data.gram[:, :, [0, 1, 2, -1]][..., [0, 1, 2, -1]], data.cross[..., [0, 1, 2, -1]], data.power)
+        scene = replace_states(scene, state)
+    normal = linearise(energy, data, state, scene.before)
+    np.testing.assert_allclose(normal.value, evaluate(energy, data, state, scene.before))
+    n, d = normal.gradient.shape
+    assert (n, d) == (FRAMES, POSE + len(energy.rows) * state.Lambda.shape[2])
+    directions = [rng.normal(size=(n, d)) for _ in range(3)]
+    for k in range(d):
+        directions.append(np.zeros((n, d)))
+        directions[-1][1, k] = 1.0
+    h = 1e-6
+    for direction in directions:
+        if not energy.free_scale:
+            direction[:, 5] = 0.0
+        values = [evaluate(energy, data, state.moved(k * direction, energy.rows), scene.before).sum() for k in (h, -h)]
+        slope = (values[0] - values[1]) / (4 * h)
+        assert (normal.gradient * direction).sum() == pytest.approx(slope, rel=1e-5, abs=1e-6 * (1 + abs(values[0])))
+
+
+def replace_states(scene: Scene, state: State) -> Scene:
+    before = replace(scene.before, Lambda=np.zeros((1, 3, state.Lambda.shape[2])))
+    return replace(scene, state=state, before=before)
+
+
+@pytest.mark.parametrize("term", ["rotation", "translation", "scale", "deformation", "rest", "inextensibility"])
+@settings(max_examples=10)
+@given(rng=SEEDS, tied=st.booleans())
+def test_gradient_of_each_prior(term: str, rng: np.random.Generator, tied: bool) -> None:
+    scene = scene_of(rng)
+    energy = replace(terms(scene)[term], tied=tied)
+    data = nothing_seen(scene)
+    assert evaluate(energy, data, scene.state, scene.before).sum() > 0
+    check_gradient(energy, data, scene, rng)
+
+
+@settings(max_examples=20)
+@given(rng=SEEDS, camera=CAMERAS)
+def test_gradient_of_the_data(rng: np.random.Generator, camera) -> None:  # type: ignore[no-untyped-def]
+    scene = scene_of(rng, camera)
+    check_gradient(SILENT, scene.data, scene, rng)
+
+
+@settings(max_examples=30)
+@given(rng=SEEDS, camera=CAMERAS, rows=ROWS, tied=st.booleans(), free_scale=st.booleans())
+def test_gradient_of_everything(rng, camera, rows, tied, free_scale) -> None:  # type: ignore[no-untyped-def]
+    scene = scene_of(rng, camera)
+    energy = replace(everything(scene, rows, tied=tied), free_scale=free_scale)
+    if not rows:
+        energy = energy.rigid()
+    check_gradient(energy, scene.data, scene, rng)
+
+
+def residuals(energy: Energy, scene: Scene, state: State) -> np.ndarray:
+    """All residuals of the energy, point by point: written down once more, without statistics."""
+    model = scene.model
+    parts: list[np.ndarray] = []
+    for w, h, M in zip(scene.W, scene.weights, state.matrices(), strict=True):
+        rho = statistics.residuals(model.B, model.normalised(w), M, model.focal)
+        parts.append(np.sqrt(h / POINTS) * rho)
+    parts.append(np.sqrt(energy.rest) * state.Lambda)
+    assert energy.edges is not None
+    for Lambda in state.Lambda:
+        d = energy.edges.rest + Lambda @ energy.edges.modes
+        length = energy.edges.length
+        parts.append(np.sqrt(energy.inextensibility / len(length)) * ((d**2).sum(axis=0) - length**2) / (2 * length))
+    chain = join([scene.before, state]) if energy.tied else state
+    for a, b in zip(range(len(chain) - 1), range(1, len(chain)), strict=True):
+        sign = 1.0 if chain.q[a] @ chain.q[b] > 0 else -1.0
+        parts.append(np.sqrt(energy.rotation) * (chain.q[b] - sign * chain.q[a]))
+        parts.append(np.sqrt(energy.translation) * (chain.t[b] - chain.t[a]))
+        parts.append(np.sqrt(energy.scale) * (chain.log_s[b] - chain.log_s[a]))
+        parts.append(np.sqrt(energy.deformation) * (chain.Lambda[b] - chain.Lambda[a]))
+    return np.concatenate([np.ravel(part) for part in parts])
+
+
+def jacobian(of: Callable[[np.ndarray], np.ndarray], size: int) -> np.ndarray:
+    h = 1e-6
+    return np.stack([(of(h * e) - of(-h * e)) / (2 * h) for e in np.eye(size)], axis=1)
+
+
+def dense(diagonal: np.ndarray, coupling: np.ndarray) -> np.ndarray:
+    n, d, _ = diagonal.shape
+    full = np.zeros((n, d, n, d))
+    for i in range(n):
+        full[i, :, i] = diagonal[i]
+    for i in range(n - 1):
+        full[i, :, i + 1], full[i + 1, :, i] = coupling[i], coupling[i].T
+    return full.reshape(n * d, n * d)
+
+
+@settings(max_examples=20)
+@given(rng=SEEDS, camera=CAMERAS, rows=st.sampled_from([(0, 1, 2), (2,), (0, 1)]), tied=st.booleans())
+def test_blocks_are_those_of_the_residuals(rng, camera, rows, tied) -> None:  # type: ignore[no-untyped-def]
+    scene = scene_of(rng, camera)
+    energy = everything(scene, rows, tied=tied)
+    normal = linearise(energy, scene.data, scene.state, scene.before)
+    n, d = normal.gradient.shape
+
+    def moved(step: np.ndarray) -> np.ndarray:
+        return residuals(energy, scene, scene.state.moved(step.reshape(n, d), rows))
+
+    rho = moved(np.zeros(n * d))
+    J = jacobian(moved, n * d)
+    assert normal.value.sum() == pytest.approx(rho @ rho, rel=1e-9)
+    np.testing.assert_allclose(normal.gradient.ravel(), J.T @ rho, rtol=1e-5, atol=1e-5)
+    full = dense(normal.diagonal, normal.coupling)
+    np.testing.assert_allclose(full, J.T @ J, rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(full, full.T, atol=1e-10)
+
+
+def test_fixed_scale_is_left_alone() -> None:
+    rng = np.random.default_rng(5)
+    scene = scene_of(rng)
+    energy = replace(everything(scene, (0, 1, 2), tied=True), free_scale=False)
+    normal = linearise(energy, scene.data, scene.state, scene.before)
+    full = dense(normal.diagonal, normal.coupling) + 1e-6 * np.eye(normal.gradient.size)
+    step = np.linalg.solve(full, normal.gradient.ravel()).reshape(normal.gradient.shape)
+    np.testing.assert_array_equal(step[:, 5], 0.0)
+    assert (step[:, 4] != 0).all()
+
+
+def test_an_untied_window_floats() -> None:
+    scene = scene_of(np.random.default_rng(6))
+    tied = everything(scene, (0, 1, 2), tied=True)
+    elsewhere = replace(scene.before, t=scene.before.t + 9.0)
+    values = [evaluate(tied, scene.data, scene.state, b)[0] for b in (scene.before, elsewhere)]
+    assert values[1] > values[0] + 1
+    floating = replace(tied, tied=False)
+    np.testing.assert_array_equal(
+        evaluate(floating, scene.data, scene.state, scene.before), evaluate(floating, scene.data, scene.state, elsewhere)
+    )
+    np.testing.assert_array_equal(
+        evaluate(tied, scene.data, scene.state, None), evaluate(floating, scene.data, scene.state, None)
+    )
+
+
+@given(SEEDS)
+def test_opposite_quaternions_are_the_same_pose(rng: np.random.Generator) -> None:
+    state = random_state(rng, 2, 2)
+    flipped = replace(state, q=state.q * [[1.0], [-1.0]])
+    np.testing.assert_allclose(flipped.matrices(), state.matrices())
+    energy = Energy()
+    np.testing.assert_allclose(
+        smoothness(energy, flipped[:1], flipped[1:]), smoothness(energy, state[:1], state[1:]), atol=1e-14
+    )
+    (q,) = unit_quaternions(rng, 1)
+    np.testing.assert_array_equal(quaternion_difference(q[None], -q[None]), np.zeros((1, 4)))
+
+
+@given(SEEDS, ROWS)
+def test_steps_move_only_the_free_rows(rng: np.random.Generator, rows: tuple[int, ...]) -> None:
+    state = random_state(rng, 2, 3)
+    step = rng.normal(size=(2, POSE + 3 * len(rows)))
+    moved = state.moved(step, rows)
+    fixed = [row for row in range(3) if row not in rows]
+    np.testing.assert_array_equal(moved.Lambda[:, fixed], state.Lambda[:, fixed])
+    np.testing.assert_allclose((moved.Lambda - state.Lambda)[:, rows].reshape(2, -1), step[:, POSE:])
+    np.testing.assert_allclose(np.linalg.norm(moved.q, axis=1), 1.0)
+    np.testing.assert_allclose(state.moved(np.zeros_like(step), rows).matrices(), state.matrices())
+
+
+@given(SEEDS)
+def test_hat_is_the_cross_product(rng: np.random.Generator) -> None:
+    a, b = rng.normal(size=(2, 3))
+    np.testing.assert_allclose(np.tensordot(a, HAT, 1) @ b, np.cross(a, b))
+
+
+@given(SEEDS)
+def test_strain_is_the_change_of_length_to_first_order(rng: np.random.Generator) -> None:
+    model = model_of(relief(rng, POINTS), ORTHOGRAPHIC, MODES)
+    edges = model.coarse_edges(12)
+    still = State(np.array([[1.0, 0, 0, 0]]), np.zeros((1, 2)), np.zeros(1), np.zeros((1, 3, MODES)))
+    np.testing.assert_allclose(edge_strain(edges, edge_vectors(edges, still)), 0.0, atol=1e-12)
+    moved = replace(still, Lambda=1e-4 * rng.normal(size=(1, 3, MODES)))
+    vectors = edge_vectors(edges, moved)
+    change = np.linalg.norm(vectors[0], axis=0) - edges.length
+    np.testing.assert_allclose(edge_strain(edges, vectors)[0], change, atol=1e-6)
+
+
+def test_joined_states_can_be_taken_apart() -> None:
+    state = random_state(np.random.default_rng(2), 4, 2)
+    again = join([state[:1], state[1:]])
+    assert len(again) == 4
+    np.testing.assert_array_equal(again.matrices(), state.matrices())
