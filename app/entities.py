@@ -12,6 +12,7 @@ Static:
   first frame); Transform3D, which gives the first shape unit size at the origin of the 3-D view (readers
   of the vertices ignore it).
 - `world/camera`: Pinhole with intrinsics and resolution, Transform3D; for perspective cameras only.
+- `world/camera/image`: Transform3D by half a pixel: everywhere here pixel centres are at whole numbers.
 - `model`: modeshape.Model with rest S̄ (3p), Upsilon Υ (rp), eigenvalues (r), Phi Φ (9), faces (3m) and
   edges (2n) int64, strips int64 (see `wireframe`; −1 ends a strip), texture_px (2p) the vertices in the
   first frame, texture_origin (2) px of the crop in it, size (2) of the picture, perspective bool,

@@ -35,8 +35,10 @@ def styles() -> Iterator[tuple[str, Loggable]]:
     yield "/", rr.AnnotationContext(names)
     for k, entity in enumerate(colors, start=1):
         # A negative radius is in points of the screen: the same size at every zoom.
-        yield entity, rr.Points2D.from_fields(class_ids=k, radii=-2.0, draw_order=30 + k)
+        yield entity, rr.Points2D.from_fields(class_ids=k, radii=-2.0, draw_order=30 + k, show_labels=False)
     yield entities.WIREFRAME, rr.LineStrips2D.from_fields(colors=[WIREFRAME_RGBA], radii=-0.5, draw_order=20)
+    # The viewer's pixels are squares between whole numbers; ours, like OpenCV's, have their centres there.
+    yield entities.IMAGE, rr.Transform3D(translation=(-0.5, -0.5, 0.0))
     yield entities.ERROR, rr.SeriesLines(names=["RMS", "median"], colors=[LOST_RGB, PREDICTED_RGB])
     yield entities.VISIBLE, rr.SeriesLines(names="seen", colors=SEEN_RGB)
 

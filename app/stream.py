@@ -109,14 +109,13 @@ def check_writable(path: Path, *, overwrite: bool) -> None:
     Raises:
         UsageError: it exists and may not be replaced, or cannot be written.
     """
+    if path.exists() and not overwrite:
+        raise UsageError(f"{path} exists: replace it with --overwrite, or choose another with --out")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        if overwrite and path.exists():
-            path.open("ab").close()
-        else:
-            path.open("xb").close()
+        new = not path.exists()
+        path.open("ab").close()
+        if new:
             path.unlink()
-    except FileExistsError as error:
-        raise UsageError(f"{path} exists: replace it with --overwrite, or choose another with --out") from error
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror}; choose another place with --out") from error
