@@ -10,13 +10,14 @@ from typing import Annotated, NoReturn
 
 import tyro
 
-from app.config import Demo, Evaluate, Run
+from app.config import Demo, Evaluate, Review, Run
 from app.errors import UsageError
 
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[Review, tyro.conf.subcommand("review")]
 )
 
 DESCRIPTION = """One ordinary video of a deforming surface becomes a moving 3-D mesh, live.
@@ -40,7 +41,7 @@ def main() -> NoReturn:
         sys.exit(INTERRUPTED)
 
 
-def parse() -> Run | Evaluate | Demo:
+def parse() -> Run | Evaluate | Demo | Review:
     """The command asked for; a mistake is told in one line instead of a panel."""
     complaint = io.StringIO()
     try:
@@ -53,12 +54,17 @@ def parse() -> Run | Evaluate | Demo:
         fail(" ".join(words.split()))
 
 
-def run(command: Run | Evaluate | Demo) -> int:
+def run(command: Run | Evaluate | Demo | Review) -> int:
     """Carry out a command; returns the exit code."""
     from app.progress import Progress
     from app.summary import as_json, as_table
 
     signal.signal(signal.SIGTERM, interrupt)
+    if isinstance(command, Review):
+        from app.review import review
+
+        review(command, Progress())
+        return 0
     if isinstance(command, Evaluate):
         from app.evaluate import evaluate
 

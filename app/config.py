@@ -151,6 +151,34 @@ class Demo:
     """Print the summary as JSON on stdout."""
 
 
+@dataclass(frozen=True)
+class Review:
+    """What is in a recording: a table, JSON, CSV, a figure, or the viewer; of two recordings side by side.
+
+    Examples:
+      modeshape review recordings/demo.rrd
+      modeshape review recordings/demo.rrd --plot demo.png --csv demo.csv
+      modeshape review recordings/paper.rrd recordings/paper-2.rrd --view
+    """
+
+    recording: tyro.conf.Positional[Path]
+    """The recording (.rrd); one of a killed run will do."""
+    other: tyro.conf.Positional[Path | None] = None
+    """Another one to compare it with."""
+    csv: Path | None = None
+    """Write a row per frame: phase, points seen, lost and recovered, errors, milliseconds, pose, sizes of Λ's rows."""
+    plot: Path | None = None
+    """Draw errors, points seen, Λ over time, times and eigenvalues as .png, .pdf or .svg."""
+    overwrite: bool = False
+    """Replace existing files."""
+    view: bool = False
+    """Open the viewer; two recordings are shown side by side."""
+    connect: str | None = None
+    """Address (host:port) of a running viewer to show it in."""
+    json: bool = False
+    """Print the facts as JSON on stdout; of two recordings as a list in "recordings"."""
+
+
 def parse_range(text: str) -> tuple[int, int | None]:
     """`A:B` as (A, B), with 0 and None where left out.
 

@@ -179,7 +179,7 @@ class Playback:
             quaternion=by_frame(entities.ESTIMATE, f"{ESTIMATE}quaternion", 4),
             t=by_frame(entities.ESTIMATE, f"{ESTIMATE}t", 2),
             s=by_frame(entities.ESTIMATE, f"{ESTIMATE}s", 1)[:, 0],
-            Lambda=by_frame(entities.ESTIMATE, f"{ESTIMATE}Lambda", 3 * modes).reshape(-1, 3, modes),
+            Lambda=by_frame(entities.ESTIMATE, f"{ESTIMATE}Lambda", 3 * modes).reshape(len(numbers), 3, modes),
             modelled=modelled,
             file=file,
         )

@@ -1,0 +1,96 @@
+"""Showing recordings in a viewer: one as it was recorded, two side by side."""
+
+import rerun as rr
+import rerun.blueprint as rrb
+from rerun.chunk import Chunk
+
+from app import entities
+from app.blueprint import blueprint
+from app.playback import Playback
+
+SIDES = ("left", "right")
+BACKGROUND = (24, 26, 32)
+
+
+def show(playbacks: list[Playback], url: str) -> None:
+    """Send one or two recordings to the viewer that listens at `url`.
+
+    Two become one recording with an entity for each side, since a viewer shows one recording at a time.
+    """
+    name = " | ".join(playback.path.stem for playback in playbacks)
+    stream = rr.RecordingStream(entities.APPLICATION if len(playbacks) == 1 else f"{entities.APPLICATION}-comparison")
+    layout = blueprint() if len(playbacks) == 1 else comparison([playback.path.stem for playback in playbacks])
+    stream.set_sinks(rr.GrpcSink(url), default_blueprint=layout)
+    stream.send_recording_name(name)
+    try:
+        for playback, side in zip(playbacks, SIDES, strict=False):
+            for chunk in playback.file:
+                if not chunk.entity_path.startswith("/__"):  # properties, as the name
+                    rr.send_chunks(chunk if len(playbacks) == 1 else moved(chunk, side), recording=stream)
+        stream.flush()
+    finally:
+        stream.disconnect()
+
+
+def moved(chunk: Chunk, side: str) -> Chunk:
+    """A chunk below an entity."""
+    return chunk.with_entity_path(f"/{side}/{chunk.entity_path.strip('/')}".rstrip("/"))
+
+
+def comparison(names: list[str]) -> rrb.Blueprint:
+    """Meshes and videos of two recordings beside each other, their plots in the same views."""
+    plots = [
+        ("Reprojection error, px", entities.ERROR),
+        ("Share of points seen", entities.VISIBLE),
+        ("Milliseconds per stage", entities.TIMING),
+    ]
+    return rrb.Blueprint(
+        rrb.Vertical(
+            rrb.Horizontal(*(mesh_view(name, side) for name, side in zip(names, SIDES, strict=True))),
+            rrb.Horizontal(*(video_view(name, side) for name, side in zip(names, SIDES, strict=True))),
+            rrb.Horizontal(
+                *(
+                    rrb.TimeSeriesView(
+                        name=title,
+                        origin="/",
+                        contents=[f"+ /{side}/{entity}/**" for side in SIDES],
+                        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
+                    )
+                    for title, entity in plots
+                )
+            ),
+            row_shares=[3, 3, 2],
+        ),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=entities.FRAME),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def mesh_view(name: str, side: str) -> rrb.Spatial3DView:
+    """The scene of one side, seen as in the blueprint of a single recording."""
+    return rrb.Spatial3DView(
+        name=f"Mesh: {name}",
+        origin=f"/{side}",
+        contents=[
+            f"+ /{side}/{entities.WORLD}/**",
+            f"- /{side}/{entities.CAMERA}/**",
+            f"+ /{side}/{entities.CAMERA}",
+        ],
+        background=BACKGROUND,
+        line_grid=False,
+        eye_controls=rrb.EyeControls3D(
+            kind=rrb.Eye3DKind.Orbital,
+            position=(0.7, -0.5, -3.4),
+            look_target=(0.0, 0.0, 0.0),
+            eye_up=(0.0, -1.0, 0.0),
+        ),
+    )
+
+
+def video_view(name: str, side: str) -> rrb.Spatial2DView:
+    """The picture of one side with its points and wireframe."""
+    origin = f"/{side}/{entities.CAMERA}"
+    return rrb.Spatial2DView(name=f"Video: {name}", origin=origin, contents="$origin/**", background=BACKGROUND)
