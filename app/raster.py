@@ -26,7 +26,7 @@ class SurfaceMap:
     """The part of the picture where the surface is seen from its front.
 
     Attributes:
-        left, top: place of the part in the picture, px.
+        left, top: place of the part in the picture, px, even numbers; so are its sizes unless the picture's are odd.
         uv: (h, w, 2) float32, px in the first frame of what a pixel shows; 0 where `cover` is 0.
         cover: (h, w) float32, share of the pixel that the surface covers: 0, 1, or in between at its edge.
     """
@@ -80,9 +80,12 @@ class Rasteriser:
             the map; None where nothing is in view.
         """
         size = np.array(self._size)
-        low = np.maximum(np.floor(points_px.min(axis=0)).astype(np.int64) - MARGIN_PX, 0)
-        high = np.minimum(np.ceil(points_px.max(axis=0)).astype(np.int64) + MARGIN_PX + 1, size)
-        if not np.isfinite(points_px).all() or (high <= low).any() or (self._perspective and depth.min() <= 0):
+        if not np.isfinite(points_px).all() or (self._perspective and depth.min() <= 0):
+            return None
+        # On even numbers, so that the part can be halved.
+        low = np.floor(np.maximum(points_px.min(axis=0) - MARGIN_PX, 0) / 2).astype(np.int64) * 2
+        high = np.minimum(np.ceil(np.minimum(points_px.max(axis=0) + MARGIN_PX, size) / 2).astype(np.int64) * 2, size)
+        if (high <= low).any():
             return None
         w, h = (high - low).tolist()
         points = points_px - low

@@ -1,0 +1,91 @@
+"""Where something is in front of the surface: what cannot be the surface under any light, and no tracked point is seen."""
+
+from typing import cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.shading import Floats, View
+
+Mask = NDArray[np.uint8]
+
+WINDOW = 9  # half-resolution px: a patch that is judged as one
+STRANGE = 6.0  # mean squared difference of a patch, in variances, that no light explains
+STILL_STRANGE = 3.0  # where something was in front in the frame before
+POINTS_PX = 12.0  # half-resolution px: reach of a point that is seen or not
+SEEN_HELP, LOST_HURT = 3.0, 0.4  # factors of STRANGE where points are seen, and where they are not
+DARKER, BRIGHTER = 0.5, 1.6  # change of light from one frame to the next that is believed
+PIXEL_STRANGE = 5.0  # at the outline, where each pixel is judged by itself
+LEAST_PX = 60  # half-resolution px: smaller patches are no hand
+LEAST_INNER = 0.08  # share of the surface, of patches that do not reach its outline: mouths and eyes are none
+
+
+def in_front(view: View, last_shade: Floats, was: Mask, points: NDArray[np.float64], visible: NDArray[np.bool_]) -> Mask:
+    """Where something hides the surface: (h, w) 0 or 1.
+
+    Args:
+        view: the frame against its prediction.
+        last_shade: (h, w) shading of the last frame.
+        was: (h, w) the last frame's answer.
+        points: (p, 2) half-resolution px.
+        visible: (p,) which of them are seen.
+    """
+    factor = threshold_factor(view.inside.shape, points, visible)
+    weight = view.inside / view.variance
+    predicted, seen = view.predicted, view.seen
+    pp, ip, ii = (
+        weight * np.einsum("hwc,hwc->hw", a, b) for a, b in ((predicted, predicted), (seen, predicted), (seen, seen))
+    )
+    sums = cv2.boxFilter(cv2.merge([pp, ip, ii, view.inside]), -1, (WINDOW, WINDOW), normalize=False)
+    light = np.clip(sums[..., 1] / np.maximum(sums[..., 0], 1e-3), DARKER * last_shade, BRIGHTER * last_shade)
+    count = 3.0 * np.maximum(sums[..., 3], 1.0)
+    strange = (sums[..., 2] - 2 * light * sums[..., 1] + light**2 * sums[..., 0]) / count
+    limit = np.where(was > 0, STILL_STRANGE, STRANGE) * factor
+    core = ((strange > limit) & (view.inside > 0)).astype(np.uint8)
+    core = cv2.morphologyEx(core, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    core = reaching(core, view.inside)
+    if not core.any():
+        return cast(Mask, core)
+    return outlined(core, view, last_shade, factor)
+
+
+def outlined(core: Mask, view: View, shade: Floats, factor: Floats) -> Mask:
+    """The patches with the outline of what is in front: the innermost is, the outermost may be, by its pixels."""
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (WINDOW, WINDOW))
+    small = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
+    sure = cv2.erode(core, disc, borderType=cv2.BORDER_CONSTANT, borderValue=1)
+    maybe = cv2.dilate(core, small)
+    off = view.seen - shade[..., None] * view.predicted
+    pixel = cv2.GaussianBlur(np.einsum("hwc,hwc->hw", off, off) / (3.0 * view.variance), (0, 0), 0.7)
+    found = ((sure > 0) | ((maybe > 0) & (pixel > PIXEL_STRANGE * np.minimum(factor, 1.0)))).astype(np.uint8)
+    found = cv2.morphologyEx(found, cv2.MORPH_CLOSE, disc)
+    return cast(Mask, cv2.morphologyEx(found, cv2.MORPH_OPEN, small))
+
+
+def reaching(mask: Mask, inside: Floats) -> Mask:
+    """Those patches of a mask that reach over the surface's outline, as an arm does, or are very large."""
+    count, label, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+    inner = cv2.erode(
+        (inside > 0).astype(np.uint8), np.ones((7, 7), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=0
+    )
+    at_edge = np.bincount(label[inner == 0], minlength=count) > 0
+    area = stats[:, cv2.CC_STAT_AREA]
+    kept = (area >= LEAST_PX) & (at_edge | (area > LEAST_INNER * inside.sum()))
+    kept[0] = False
+    return cast(Mask, kept[label].astype(np.uint8))
+
+
+def threshold_factor(shape: tuple[int, ...], points: NDArray[np.float64], visible: NDArray[np.bool_]) -> Floats:
+    """How much more than usual a patch (h, w) must differ: more where points are seen, less where they are lost."""
+    h, w = shape
+    step = 4
+    size = (h // step + 1, w // step + 1)
+    cell = np.rint(points / step).astype(np.int64)
+    within = ((cell >= 0) & (cell < size[::-1])).all(axis=1)
+    number = cell[within, 1] * size[1] + cell[within, 0]
+    maps = [np.bincount(number, flags[within].astype(float), minlength=size[0] * size[1]) for flags in (visible, ~visible)]
+    near = cv2.GaussianBlur(np.stack(maps, axis=-1).reshape(*size, 2), (0, 0), POINTS_PX / 2 / step)
+    share = (near[..., 0] + 1e-3) / (near.sum(axis=-1) + 2e-3)
+    factor = LOST_HURT * (SEEN_HELP / LOST_HURT) ** share
+    return cast(Floats, cv2.resize(factor.astype(np.float32), (w, h), interpolation=cv2.INTER_LINEAR))
