@@ -95,7 +95,7 @@ class Energy:
         translation: λ_t on ‖Δt‖².
         scale: λ_s on (Δ log s)².
         deformation: λ_γ on ‖ΔΛ'‖².
-        rest: λ_0 on ‖Λ'‖², the pull to the rest shape.
+        rest: λ_0 on ‖Λ'‖², the pull to the rest shape; (r,) where each mode has its own.
         inextensibility: κ on the mean squared edge strain term of `edges`.
         rows: rows of Λ that are estimated (§3.4): 0 and 1 stretch in the plane, 2 bends out of it.
         free_scale: whether s is estimated; the paper's energy keeps s = 1.
@@ -107,7 +107,7 @@ class Energy:
     translation: float = 0.0
     scale: float = 1e-3
     deformation: float = 1e-2
-    rest: float = 1e-2
+    rest: float | Array = 1e-2
     inextensibility: float = 0.0
     rows: tuple[int, ...] = (0, 1, 2)
     free_scale: bool = True
@@ -138,7 +138,7 @@ class Normal:
 
 def evaluate(energy: Energy, data: Statistics, state: State, before: State | None) -> Array:
     """Energy (n,) per frame; `before` is the frame that has left the window (n = 1)."""
-    value = statistics.value(data, state.matrices()) + energy.rest * (state.Lambda**2).sum(axis=(1, 2))
+    value = statistics.value(data, state.matrices()) + (energy.rest * state.Lambda**2).sum(axis=(1, 2))
     if energy.edges is not None:
         strain = edge_strain(energy.edges, edge_vectors(energy.edges, state))
         value += energy.inextensibility * (strain**2).mean(axis=1)
@@ -201,10 +201,11 @@ def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> 
 
 def add_rest(normal: Normal, energy: Energy, state: State) -> None:
     """λ_0‖Λ'‖²: the pull to the rest shape."""
-    free = state.Lambda[:, energy.rows, :].reshape(len(state), -1)
-    normal.gradient[:, POSE:] += energy.rest * free
+    free = state.Lambda[:, energy.rows, :]
+    weights = np.broadcast_to(energy.rest, free.shape).reshape(len(state), -1)
+    normal.gradient[:, POSE:] += weights * free.reshape(len(state), -1)
     diagonal = np.arange(POSE, normal.gradient.shape[1])
-    normal.diagonal[:, diagonal, diagonal] += energy.rest
+    normal.diagonal[:, diagonal, diagonal] += weights
 
 
 def edge_vectors(edges: CoarseEdges, state: State) -> Array:

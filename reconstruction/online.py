@@ -8,15 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError, rest_shape
-from reconstruction.camera import Camera, quaternion_exp, quaternion_from_rotation, quaternion_product
-from reconstruction.energy import Energy, State, join
+from reconstruction.camera import Camera
+from reconstruction.energy import Energy
 from reconstruction.mesh import Mesh, mesh_from_faces, triangulate
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.modes import Metric, modal_basis, principal_axes
 from reconstruction.rest_shape import RestShape
-from reconstruction.rigid import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE, pose_energy
-from reconstruction.statistics import Statistics, stack
-from reconstruction.window import Solver, minimise
+from reconstruction.rigid import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE
+from reconstruction.window import SlidingWindow
 
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
@@ -36,8 +35,6 @@ BOOTSTRAP_SCHEDULE = (
     45,
     60,
 )  # frames after which a rigid shape is looked for; the last decides
-FEWEST_POINTS = 4
-TILT_GAIN = 0.7  # of the first frame's energy, below which another tilt is believed
 
 
 class Phase(Enum):
@@ -169,7 +166,7 @@ class Reconstruction:
             self.deformation = "inextensible" if rest.flat else "general"
         model = build_model(rest, self.camera, self.settings, self._mesh)
         energy = build_energy(model, self.deformation, paper=self.settings.energy == "paper")
-        self.window = SlidingWindow(model, energy, self.settings.window, rest)
+        self.window = SlidingWindow(model, energy, self.settings.window, rest.motion)
         waiting, self._waiting = self._waiting, []
         return [self.window.advance(W, visible) for W, visible in waiting]
 
@@ -197,92 +194,10 @@ def build_energy(model: Model, deformation: Deformation, *, paper: bool) -> Ener
     if paper:
         return Energy(rows=rows, rest=0.0, deformation=1e-3, free_scale=False, tied=False)
     scale = PERSPECTIVE_SCALE if model.camera.perspective else ORTHOGRAPHIC_SCALE
+    # A mode's eigenvalue says how much of the shape's extent it carries: weak modes are pulled to rest harder.
+    stiffness = model.basis.eigenvalues**-0.5
+    stiffness /= np.exp(np.log(stiffness).mean())
     if deformation == "inextensible":
         edges = model.coarse_edges()
-        return Energy(scale=scale, deformation=1e-3, rest=1e-3, inextensibility=3.0, rows=rows, edges=edges)
-    return Energy(scale=scale, deformation=1e-2, rest=1e-2, rows=rows)
-
-
-class SlidingWindow:
-    """Bundle adjustment over the last frames; one public verb.
-
-    Attributes:
-        model: the rest shape and its modes.
-        state: the window's frames.
-    """
-
-    def __init__(self, model: Model, energy: Energy, length: int, rest: RestShape) -> None:
-        self.model, self.energy, self.length, self.rest = model, energy, length, rest
-        self.state: State | None = None
-        self.before: State | None = None
-        self._data: list[Statistics] = []
-        self._frame = -1
-
-    def advance(self, W: Array, visible: Visibility) -> ShapeEstimate:
-        """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape."""
-        self._frame += 1
-        weights = visible.astype(np.float64)
-        self._data.append(self.model.statistics(W, weights))
-        # A new frame starts where the last one is: at constant velocity a tilt overshoots into the mirrored branch.
-        window = self._first_state(W, visible) if self.state is None else join([self.state, self.state[-1:]])
-        if len(window) > self.length:
-            self.before, window = window[:1], window[1:]
-            self._data.pop(0)
-        window = minimise(self.energy, stack(self._data), window, self.before, Solver()).state
-        robust = robust_weights(self.model.residuals(W, window), visible)
-        self._data[-1] = self.model.statistics(W, robust)
-        self.state = minimise(self.energy, stack(self._data), window, self.before, Solver()).state
-        return self.model.estimate(self._frame, W, visible, self.state)
-
-    def predict(self) -> Array | None:
-        """Image (p, 2) px of the next frame at constant velocity."""
-        if self.state is None:
-            return None
-        last = self.state[-1:]
-        return self.model.projection(extrapolated(self.state[-2:-1], last) if len(self.state) > 1 else last).T
-
-    def _first_state(self, W: Array, visible: Visibility) -> State:
-        """Pose of the first frame with nothing deformed, from tilted hypotheses: a frontal flat sheet is a saddle."""
-        motion, model = self.rest.motion, self.model
-        r = model.basis.Upsilon.shape[0]
-        energy = pose_energy(model.camera)
-        data = model.rigid_statistics(W, visible.astype(np.float64))
-        seen = W[:, visible] - model.camera.center_px[:, None]
-        flat_size = np.sqrt(np.var(motion.shape[:, visible], axis=1)[:2].sum())
-        log_s = float(np.log(np.sqrt(np.var(seen, axis=1).sum()) / flat_size))
-        t = seen.mean(axis=1) / model.radius
-        best = None
-        for tilt in (np.zeros(3), *(0.3 * rest_shape.tilt_axes())):
-            q = quaternion_product(quaternion_exp(tilt), quaternion_from_rotation(motion.R[0] @ model.basis.Phi))
-            start = State(q[None], t[None], np.array([log_s]), np.zeros((1, 3, 0)))
-            solution = minimise(energy, data, start, None, Solver())
-            # The rest shape's own pose, tried first, is usually right: a tilt must be clearly better.
-            if best is None or solution.value[0] < TILT_GAIN * best.value[0]:
-                best = solution
-        assert best is not None
-        return replace(best.state, Lambda=np.zeros((1, 3, r)))
-
-
-def extrapolated(earlier: State, last: State) -> State:
-    """One frame further at constant velocity."""
-    conjugate = earlier.q * np.array([1.0, -1.0, -1.0, -1.0])
-    turned = quaternion_product(last.q, quaternion_product(conjugate, last.q))
-    return State(
-        turned / np.linalg.norm(turned, axis=1, keepdims=True),
-        2 * last.t - earlier.t,
-        2 * last.log_s - earlier.log_s,
-        2 * last.Lambda - earlier.Lambda,
-    )
-
-
-ROBUST_SIGMAS = 5.0
-
-
-def robust_weights(residuals: Array, visible: Visibility) -> Array:
-    """Weights (p,) that let points far outside the spread of the residuals (2, p) px count little (Geman-McClure)."""
-    distance = np.linalg.norm(np.where(visible, residuals, 0.0), axis=0)
-    if visible.sum() < FEWEST_POINTS:
-        return visible.astype(np.float64)
-    sigma = np.median(distance[visible]) / 1.1774  # median of a Rayleigh distribution
-    excess = np.maximum(distance / max(ROBUST_SIGMAS * sigma, 1e-9), 1.0)
-    return np.where(visible, excess**-4.0, 0.0)
+        return Energy(scale=scale, deformation=1e-3, rest=1e-3 * stiffness, inextensibility=3.0, rows=rows, edges=edges)
+    return Energy(scale=scale, deformation=1e-2, rest=1e-2 * stiffness, rows=rows)

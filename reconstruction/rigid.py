@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.energy import Energy, State
+from reconstruction.solver import Solver, minimise
 from reconstruction.statistics import frame_statistics, stack
-from reconstruction.window import Solver, minimise
 
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]

@@ -1,109 +1,126 @@
-"""Levenberg-Marquardt over a sliding window of frames (paper §5), with block tridiagonal normal equations."""
+"""Bundle adjustment over a sliding window of frames, robust to outliers (paper §5)."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError
-from scipy.linalg.blas import dsyrk, dtrsm
-from scipy.linalg.lapack import dpotrf
 
-from reconstruction.energy import Energy, Normal, State, evaluate, linearise
-from reconstruction.statistics import Statistics
+from reconstruction.camera import CONJUGATE, quaternion_exp, quaternion_from_rotation, quaternion_product
+from reconstruction.energy import Energy, State, join
+from reconstruction.model import Model, ShapeEstimate
+from reconstruction.rest_shape import tilt_axes
+from reconstruction.rigid import RigidMotion, pose_energy
+from reconstruction.solver import Solution, Solver, minimise
+from reconstruction.statistics import Statistics, stack
 
 Array = NDArray[np.float64]
+Visibility = NDArray[np.bool_]
+
+FEWEST_POINTS = 4
+ROBUST_SIGMAS = 5.0  # deviations from the model beyond which a point counts less
+SURPRISE = 2.0  # times the usual energy of a new frame, above which other bends are tried
+BENT_GAIN = 0.95  # of the window's energy, below which another bend is believed
+TILT_GAIN = 0.7  # of the first frame's energy, below which another tilt is believed
+FIRST_TILT = 0.3  # radians the first frame is tilted by: a frontal flat sheet is a saddle that the solver never leaves
+OTHER_BENDS = (np.zeros((3, 1)), np.array([[1.0], [1.0], [-1.0]]))  # factors on the rows of Λ: undeformed, bent back
 
 
-@dataclass(frozen=True)
-class Solver:
-    """Levenberg-Marquardt settings."""
-
-    iterations: int = 25
-    """Most steps tried."""
-    tolerance: float = 1e-3
-    """Stop when a step lowers the energy by less than this share of it."""
-    damping: float = 1e-4
-    """First damping, relative to the diagonal of the normal matrix."""
-
-
-@dataclass(frozen=True)
-class Solution:
-    """Where the minimisation ended.
-
-    Attributes:
-        state: the window's frames.
-        value: (n,) energy per frame.
-        steps: steps tried.
-    """
-
-    state: State
-    value: Array
-    steps: int
-
-
-def minimise(energy: Energy, data: Statistics, start: State, before: State | None, solver: Solver) -> Solution:
-    """Minimise the energy of a window from `start`; `before` is the frame that has left it."""
-    state, damping, steps = start, solver.damping, 0
-    normal = linearise(energy, data, state, before)
-    while steps < solver.iterations:
-        steps += 1
-        trial = state.moved(damped_step(normal, damping), energy.rows)
-        value = evaluate(energy, data, trial, before)
-        gain = normal.value.sum() - value.sum()
-        if not gain > 0:  # also when not finite
-            if damping > 1e8 or abs(gain) <= 1e-14 * normal.value.sum():
-                break
-            damping *= 10
-            continue
-        settled = gain <= solver.tolerance * normal.value.sum()
-        state, damping = trial, max(damping / 10, 1e-9)
-        if settled:
-            return Solution(state, value, steps)
-        normal = linearise(energy, data, state, before)
-    return Solution(state, normal.value, steps)
-
-
-def damped_step(normal: Normal, damping: float) -> Array:
-    """Marquardt's step (n, d): the diagonal raised by a share of itself."""
-    diagonal = normal.diagonal.copy()
-    index = np.arange(diagonal.shape[1])
-    scale = diagonal[:, index, index]
-    diagonal[:, index, index] += damping * scale + 1e-10 * (1 + scale.max())
-    try:
-        return -solve_block_tridiagonal(diagonal, normal.coupling, normal.gradient)
-    except LinAlgError:
-        return np.full_like(normal.gradient, np.nan)
-
-
-def solve_block_tridiagonal(diagonal: Array, coupling: Array, right: Array) -> Array:
-    """Solve the symmetric positive definite block tridiagonal system by block Cholesky, O(n d³).
+class SlidingWindow:
+    """Bundle adjustment over the last frames; one public verb.
 
     Args:
-        diagonal: (n, d, d) diagonal blocks.
-        coupling: (n-1, d, d) blocks above the diagonal.
-        right: (n, d).
+        model: the rest shape and its modes.
+        energy: what is minimised.
+        length: frames 𝒲 in the window.
+        motion: how the rest shape is seen in the first frame.
 
-    Raises:
-        LinAlgError: the matrix is not positive definite.
+    Attributes:
+        state: the window's frames; None before the first.
     """
-    n = len(diagonal)
-    factors: list[Array] = []
-    links: list[Array] = []  # L_i⁻¹ U_i
-    y = np.empty_like(right)
-    for i in range(n):
-        block, b = diagonal[i], right[i]
-        if i:
-            block = block - dsyrk(1.0, links[-1], trans=1, lower=1)
-            b = b - links[-1].T @ y[i - 1]
-        factor, failed = dpotrf(block, lower=1, clean=0)
-        if failed:
-            raise LinAlgError("not positive definite")
-        factors.append(factor)
-        y[i] = dtrsm(1.0, factor, b[:, None], lower=1)[:, 0]
-        if i < n - 1:
-            links.append(dtrsm(1.0, factor, coupling[i], lower=1))
-    x = np.empty_like(right)
-    for i in range(n - 1, -1, -1):
-        b = y[i] - links[i] @ x[i + 1] if i < n - 1 else y[i]
-        x[i] = dtrsm(1.0, factors[i], b[:, None], lower=1, trans_a=1)[:, 0]
-    return x
+
+    def __init__(self, model: Model, energy: Energy, length: int, motion: RigidMotion) -> None:
+        self.model = model
+        self.state: State | None = None
+        self._energy, self._length, self._motion = energy, length, motion
+        self._before: State | None = None  # the frame that has left the window
+        self._data: list[Statistics] = []
+        self._usual = np.inf  # energy of a new frame, running mean
+        self._frame = -1
+
+    def advance(self, W: Array, visible: Visibility) -> ShapeEstimate:
+        """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape."""
+        self._frame += 1
+        self._data.append(self.model.statistics(W, visible.astype(np.float64)))
+        # A new frame starts as the last one: at constant velocity a tilt would overshoot into the mirrored branch.
+        window = self._first_state(W, visible) if self.state is None else join([self.state, self.state[-1:]])
+        if len(window) > self._length:
+            self._before, window = window[:1], window[1:]
+            self._data.pop(0)
+        found = self._adjust(window)
+        if self._energy.edges is not None and found.value[-1] > SURPRISE * self._usual:
+            found = self._bent_otherwise(found)
+        weights = robust_weights(self.model.residuals(W, found.state), visible)
+        if not np.array_equal(weights, visible):
+            self._data[-1] = self.model.statistics(W, weights)
+            found = self._adjust(found.state)
+        newest = float(found.value[-1])
+        self._usual = newest if np.isinf(self._usual) else 0.9 * self._usual + 0.1 * newest
+        self.state = found.state
+        return self.model.estimate(self._frame, W, visible, self.state)
+
+    def predict(self) -> Array | None:
+        """Image (p, 2) px of the next frame at constant velocity; None before the first frame."""
+        if self.state is None:
+            return None
+        last = self.state[-1:]
+        return self.model.projection(extrapolated(self.state[-2:-1], last) if len(self.state) > 1 else last).T
+
+    def _adjust(self, start: State) -> Solution:
+        return minimise(self._energy, stack(self._data), start, self._before, Solver())
+
+    def _bent_otherwise(self, found: Solution) -> Solution:
+        """The best of a solution and those with the newest frame undeformed or bent back at the start.
+
+        Edge lengths make the energy of Λ non-convex: a sheet bent one way or the other looks alike.
+        """
+        for factors in OTHER_BENDS:
+            Lambda = found.state.Lambda.copy()
+            Lambda[-1] *= factors
+            other = self._adjust(replace(found.state, Lambda=Lambda))
+            if other.value.sum() < BENT_GAIN * found.value.sum():
+                found = other
+        return found
+
+    def _first_state(self, W: Array, visible: Visibility) -> State:
+        """Pose of the first frame with nothing deformed: that of the bootstrap, or a clearly better tilt."""
+        shape, model = self._motion.shape, self.model
+        data = model.rigid_statistics(W, visible.astype(np.float64))
+        seen = W[:, visible] - model.camera.center_px[:, None]
+        extent = np.var((self._motion.R[0] @ shape)[:2, visible], axis=1).sum()
+        log_s = np.log(np.sqrt(np.var(seen, axis=1).sum() / extent))
+        q = quaternion_from_rotation(self._motion.R[0] @ model.basis.Phi)
+        start = State(q[None], seen.mean(axis=1)[None] / model.radius, np.array([log_s]), np.zeros((1, 3, 0)))
+        energy = pose_energy(model.camera)
+        found = minimise(energy, data, start, None, Solver())
+        for tilt in FIRST_TILT * tilt_axes():
+            tilted = replace(start, q=quaternion_product(quaternion_exp(tilt), q)[None])
+            other = minimise(energy, data, tilted, None, Solver())
+            if other.value[0] < TILT_GAIN * found.value[0]:
+                found = other
+        return replace(found.state, Lambda=np.zeros((1, 3, len(model.basis.eigenvalues))))
+
+
+def extrapolated(earlier: State, last: State) -> State:
+    """One frame further at constant velocity."""
+    turned = quaternion_product(last.q, quaternion_product(earlier.q * CONJUGATE, last.q))
+    return State(turned, 2 * last.t - earlier.t, 2 * last.log_s - earlier.log_s, 2 * last.Lambda - earlier.Lambda)
+
+
+def robust_weights(residuals: Array, visible: Visibility) -> Array:
+    """Weights (p,) that let points far outside the spread of the residuals (2, p) px count little (Geman-McClure)."""
+    distance = np.linalg.norm(np.where(visible, residuals, 0.0), axis=0)
+    if visible.sum() < FEWEST_POINTS:
+        return visible.astype(np.float64)
+    sigma = np.median(distance[visible]) / 1.1774  # median of a Rayleigh distribution
+    excess = np.maximum(distance / max(ROBUST_SIGMAS * sigma, 1e-9), 1.0)
+    return np.where(visible, excess**-4.0, 0.0)

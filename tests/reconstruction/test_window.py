@@ -10,7 +10,7 @@ from scipy.linalg import LinAlgError
 
 from reconstruction.camera import Camera, quaternion_exp, quaternion_from_rotation, quaternion_product
 from reconstruction.energy import Energy, State, evaluate
-from reconstruction.window import Solver, minimise, solve_block_tridiagonal
+from reconstruction.solver import Solver, minimise, solve_block_tridiagonal
 from tests.reconstruction.world import CAMERAS, SEEDS, model_of, relief, seen, shape_error, statistics_of, turns
 
 

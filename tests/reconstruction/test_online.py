@@ -1,0 +1,307 @@
+"""The on-line estimator: frame by frame, on surfaces whose true shape is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reconstruction import ReconstructionError, rest_shape
+from reconstruction.camera import Camera
+from reconstruction.evaluation import e3d
+from reconstruction.model import ShapeEstimate
+from reconstruction.online import Deformation, Phase, Reconstruction, Settings, robust_weights
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, flat, relief, rolled, seen, turn, turns
+
+FRAMES, POINTS = 26, 70
+SETTINGS = Settings(modes=8)
+
+
+def bending_sheet(camera: Camera = PERSPECTIVE, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
+    """Images (F, 2, p) px of a sheet that is rolled up and flattened while it turns, and its shapes in camera axes."""
+    sheet = flat(np.random.default_rng(0), points)
+    tilt = turn((12, -8, 0))
+    shapes = np.stack([rolled(sheet, 0.009 * np.sin(np.pi * f / (FRAMES - 1))) for f in range(FRAMES)])
+    R = np.stack([turn((6 * np.sin(f / 5), 20 * f / FRAMES, 3 * f / FRAMES)) for f in range(FRAMES)])
+    return seen(shapes, R @ tilt, camera)
+
+
+def swelling_hill(camera: Camera = PERSPECTIVE) -> tuple[np.ndarray, np.ndarray]:
+    """A solid that turns rigidly for 15 frames, then one side of it swells and sinks."""
+    rest = relief(np.random.default_rng(0), POINTS)
+    x, y, _ = rest
+    bump = 60 * np.exp(-((x - 30) ** 2 + (y + 20) ** 2) / 60**2) * np.array([[0.3], [0.3], [1.0]])
+    amounts = np.concatenate([np.zeros(15), np.sin(np.linspace(0, np.pi, FRAMES - 15))])
+    shapes = rest + amounts[:, None, None] * (bump - bump.mean(axis=1, keepdims=True))
+    return seen(shapes, turns(FRAMES), camera)
+
+
+def still_sheet(noise_px: float = 0.05) -> np.ndarray:
+    rng = np.random.default_rng(1)
+    shapes = np.broadcast_to(flat(rng, POINTS), (70, 3, POINTS))
+    W, _ = seen(shapes, np.broadcast_to(np.eye(3), (70, 3, 3)), PERSPECTIVE)
+    return W + rng.normal(0, noise_px, W.shape)
+
+
+def reconstruct(
+    W: np.ndarray,
+    camera: Camera = PERSPECTIVE,
+    settings: Settings = SETTINGS,
+    truth: np.ndarray | None = None,
+    visible: np.ndarray | None = None,
+) -> tuple[Reconstruction, list[ShapeEstimate]]:
+    """All frames, as the frame loop gives them; with `truth`, its first shape is the rest shape."""
+    given = None if truth is None else rest_shape.given(truth[0], "truth", "first true shape")
+    visible = np.ones((len(W), W.shape[2]), bool) if visible is None else visible
+    reconstruction = Reconstruction(camera, settings, given)
+    estimates: list[ShapeEstimate] = []
+    for w, h in zip(W, visible, strict=True):
+        estimates += reconstruction.update(np.where(h, w, np.nan), h)
+    return reconstruction, estimates + reconstruction.finish()
+
+
+def shapes_of(estimates: list[ShapeEstimate]) -> np.ndarray:
+    return np.stack([e.shape for e in estimates])
+
+
+def error(estimates: list[ShapeEstimate], truth: np.ndarray) -> float:
+    return float(e3d(shapes_of(estimates), truth).mean())
+
+
+def static_error(reconstruction: Reconstruction, truth: np.ndarray) -> float:
+    assert reconstruction.rest is not None
+    return float(e3d(np.broadcast_to(reconstruction.rest.motion.shape, truth.shape), truth).mean())
+
+
+@pytest.mark.parametrize(("deformation", "share"), [("inextensible", 0.4), ("bending", 0.7)])
+def test_a_bending_sheet_is_followed(deformation: Deformation, share: float) -> None:
+    W, truth = bending_sheet()
+    reconstruction, estimates = reconstruct(W, settings=replace(SETTINGS, deformation=deformation), truth=truth)
+    static = static_error(reconstruction, truth)
+    assert static > 0.03
+    assert error(estimates, truth) < share * static
+    rms = np.sqrt(np.mean([e.residual_px**2 for e in estimates]))
+    assert rms < 2.0
+
+
+def test_auto_takes_a_sheet_for_inextensible() -> None:
+    W, truth = bending_sheet()
+    reconstruction, estimates = reconstruct(W, truth=truth)
+    assert reconstruction.deformation == "inextensible"
+    assert error(estimates, truth) < 0.5 * static_error(reconstruction, truth)
+
+
+def test_a_solid_is_factorised_then_deformed() -> None:
+    W, truth = swelling_hill(ORTHOGRAPHIC)
+    settings = replace(SETTINGS, rest_shape="rigid", bootstrap_frames=12)
+    reconstruction, estimates = reconstruct(W, ORTHOGRAPHIC, settings)
+    assert reconstruction.rest is not None
+    assert reconstruction.rest.kind == "rigid"
+    assert reconstruction.bootstrap_frames == 12
+    assert reconstruction.deformation == "general"
+    assert [e.frame for e in estimates] == list(range(FRAMES))
+    assert error(estimates, truth) < 0.6 * static_error(reconstruction, truth)
+
+
+def test_shapes_of_the_bootstrap_come_when_it_is_over() -> None:
+    W, _ = swelling_hill()
+    reconstruction = Reconstruction(PERSPECTIVE, replace(SETTINGS, rest_shape="rigid", bootstrap_frames=8))
+    visible = np.ones(POINTS, bool)
+    for f in range(7):
+        assert reconstruction.update(W[f], visible) == []
+        assert reconstruction.phase is Phase.BOOTSTRAP
+        assert reconstruction.predict() is None
+    with pytest.raises(ReconstructionError, match="no rest shape yet"):
+        _ = reconstruction.model
+    assert [e.frame for e in reconstruction.update(W[7], visible)] == list(range(8))
+    assert reconstruction.phase is Phase.TRACKING
+    assert [e.frame for e in reconstruction.update(W[8], visible)] == [8]
+    assert reconstruction.finish() == []
+
+
+@pytest.mark.parametrize("kind", ["auto", "plane"])
+def test_a_source_that_ends_early_still_gets_its_shapes(kind: str) -> None:
+    W, _ = bending_sheet()
+    reconstruction, estimates = reconstruct(W[:5], settings=replace(SETTINGS, rest_shape=kind))  # type: ignore[arg-type]
+    assert [e.frame for e in estimates] == list(range(5))
+    assert reconstruction.rest is not None
+    assert reconstruction.rest.kind == "plane"
+    if kind == "auto":
+        assert "too few frames for a rigid shape" in reconstruction.rest.note
+
+
+@pytest.mark.parametrize("frames", ["auto", 20])
+def test_a_still_scene_is_no_rigid_shape(frames: int | str) -> None:
+    settings = replace(SETTINGS, rest_shape="rigid", bootstrap_frames=None if frames == "auto" else int(frames))
+    words = r"cannot recover a rest shape: the object turned \d+\.\d° in \d+ frames, about 10° are needed"
+    with pytest.raises(ReconstructionError, match=words + r".*--rest-shape plane"):
+        reconstruct(still_sheet(), settings=settings)
+
+
+def test_auto_falls_back_to_the_sheet_and_says_so() -> None:
+    reconstruction, estimates = reconstruct(still_sheet())
+    assert reconstruction.rest is not None
+    assert reconstruction.rest.kind == "plane"
+    assert "no rigid shape: the object turned" in reconstruction.rest.note
+    assert "10° are needed" in reconstruction.rest.note
+    assert len(estimates) == 70
+    rms = np.sqrt(np.mean([e.residual_px**2 for e in estimates]))
+    assert rms < 0.2
+
+
+def test_auto_finds_a_solid() -> None:
+    W, truth = swelling_hill(ORTHOGRAPHIC)
+    reconstruction, estimates = reconstruct(W, ORTHOGRAPHIC)
+    assert reconstruction.rest is not None
+    assert reconstruction.rest.kind == "rigid"
+    assert reconstruction.bootstrap_frames <= 15
+    assert error(estimates, truth) < 0.06
+
+
+@pytest.mark.parametrize(("deformation", "fixed"), [("bending", [0, 1]), ("stretching", [2])])
+def test_constraints_are_rows_that_stay_zero(deformation: Deformation, fixed: list[int]) -> None:
+    W, truth = swelling_hill()
+    _, estimates = reconstruct(W, settings=replace(SETTINGS, deformation=deformation), truth=truth)
+    Lambda = np.stack([e.Lambda for e in estimates])
+    np.testing.assert_array_equal(Lambda[:, fixed], 0.0)
+    free = [row for row in range(3) if row not in fixed]
+    assert np.abs(Lambda[:, free]).max() > 0.1
+
+
+def test_inextensible_keeps_the_edges_better_than_general() -> None:
+    W, truth = bending_sheet()
+    change = {}
+    for deformation in ("inextensible", "general"):
+        settings = replace(SETTINGS, deformation=deformation)  # type: ignore[arg-type]
+        reconstruction, estimates = reconstruct(W, settings=settings, truth=truth)
+        i, j = reconstruction.model.mesh.edges.T
+        S, rest = shapes_of(estimates), reconstruction.model.basis.rest
+        ratio = np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1) / np.linalg.norm(rest[:, i] - rest[:, j], axis=0)
+        change[deformation] = np.abs(ratio - 1).mean()
+    assert change["inextensible"] < 0.03
+    assert change["inextensible"] < change["general"]
+
+
+@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
+def test_the_size_of_the_picture_does_not_matter(camera: Camera) -> None:
+    W, truth = bending_sheet(camera)
+    _, one = reconstruct(W, camera, truth=truth)
+    _, two = reconstruct(2 * W, Camera(2 * camera.focal_px, 2 * camera.center_px), truth=2 * truth)
+    assert error(two, truth) == pytest.approx(error(one, truth), rel=1e-3)
+    np.testing.assert_allclose(shapes_of(two), 2 * shapes_of(one), atol=0.05)
+
+
+@pytest.mark.parametrize("kind", ["plane", "rigid"])
+def test_the_size_of_the_picture_does_not_matter_to_the_bootstrap(kind: str) -> None:
+    W, _ = swelling_hill()
+    settings = replace(SETTINGS, rest_shape=kind, bootstrap_frames=12)  # type: ignore[arg-type]
+    _, one = reconstruct(W, settings=settings)
+    _, two = reconstruct(2 * W, Camera(2 * PERSPECTIVE.focal_px, 2 * PERSPECTIVE.center_px), settings)
+    difference = np.linalg.norm(shapes_of(two) - 2 * shapes_of(one)) / np.linalg.norm(shapes_of(two))
+    assert difference < 1e-3
+
+
+def test_the_order_of_the_points_does_not_matter() -> None:
+    W, truth = bending_sheet()
+    order = np.random.default_rng(3).permutation(POINTS)
+    _, one = reconstruct(W, truth=truth)
+    _, two = reconstruct(W[:, :, order], truth=truth[:, :, order])
+    np.testing.assert_allclose(shapes_of(two), shapes_of(one)[:, :, order], atol=0.05)
+
+
+def test_the_same_input_gives_the_same_output() -> None:
+    W, _ = bending_sheet()
+    np.testing.assert_array_equal(shapes_of(reconstruct(W)[1]), shapes_of(reconstruct(W)[1]))
+
+
+def test_hidden_points_are_carried_along_by_the_others() -> None:
+    W, truth = bending_sheet()
+    visible = np.random.default_rng(0).random((FRAMES, POINTS)) >= 0.4
+    visible[:2] = True
+    reconstruction, estimates = reconstruct(W, truth=truth, visible=visible)
+    assert np.isfinite(shapes_of(estimates)).all()
+    assert error(estimates, truth) < 0.6 * static_error(reconstruction, truth)
+    for estimate, seen_now in zip(estimates, visible, strict=True):
+        np.testing.assert_array_equal(estimate.visible, seen_now)
+        np.testing.assert_array_equal(np.isfinite(estimate.residual_px), seen_now)
+
+
+@pytest.mark.parametrize("size_px", [25, 80])
+def test_outliers_cost_hardly_more_than_hiding_them(size_px: float) -> None:
+    W, truth = bending_sheet(points=300)
+    rng = np.random.default_rng(0)
+    wrong = rng.random((FRAMES, 300)) < 0.05
+    wrong[0] = False
+    settings = Settings(modes=20)
+    _, hidden = reconstruct(W, settings=settings, truth=truth, visible=~wrong)
+    _, there = reconstruct(
+        W + np.where(wrong[:, None], rng.normal(0, size_px, W.shape), 0.0), settings=settings, truth=truth
+    )
+    assert error(there, truth) < error(hidden, truth) + 0.005
+
+
+@pytest.mark.parametrize("seen_points", [0, 3, 10])
+def test_frames_with_few_points_neither_fail_nor_fly_away(seen_points: int) -> None:
+    W, truth = bending_sheet()
+    visible = np.ones((FRAMES, POINTS), bool)
+    visible[10:13] = False
+    visible[10:13, : seen_points * 7 : 7] = True
+    _, estimates = reconstruct(W, truth=truth, visible=visible)
+    per_frame = e3d(shapes_of(estimates), truth)
+    still = e3d(np.broadcast_to(truth[0], truth.shape), truth)
+    assert np.isfinite(per_frame).all()
+    assert (per_frame[10:13] < 1.1 * still[10:13]).all()  # at worst pulled back to rest
+    assert per_frame[-1] < 0.06  # and finds back
+
+
+def test_prediction_is_near_what_comes() -> None:
+    W, truth = bending_sheet()
+    reconstruction = Reconstruction(PERSPECTIVE, SETTINGS, rest_shape.given(truth[0], "truth", ""))
+    visible = np.ones(POINTS, bool)
+    for f, w in enumerate(W):
+        if f > 2:
+            predicted = reconstruction.predict()
+            assert predicted is not None
+            assert predicted.shape == (POINTS, 2)
+            surprise = np.sqrt(((predicted.T - w) ** 2).sum(axis=0).mean())
+            step = np.sqrt(((W[f - 1] - w) ** 2).sum(axis=0).mean())
+            assert surprise < max(1.5, step)
+        reconstruction.update(w, visible)
+
+
+@pytest.mark.parametrize("window", [1, 2, 8])
+def test_any_window_will_do(window: int) -> None:
+    W, truth = bending_sheet()
+    reconstruction, estimates = reconstruct(W, settings=replace(SETTINGS, window=window), truth=truth)
+    assert len(estimates) == FRAMES
+    assert error(estimates, truth) < 0.7 * static_error(reconstruction, truth)
+
+
+def test_the_papers_energy_keeps_the_scale_and_floats() -> None:
+    W, truth = swelling_hill(ORTHOGRAPHIC)
+    settings = replace(SETTINGS, energy="paper", deformation="bending")
+    _, estimates = reconstruct(W, ORTHOGRAPHIC, settings, truth=truth)
+    scales = [e.s for e in estimates]
+    assert max(scales) - min(scales) < 1e-9
+    assert scales[0] == pytest.approx(1.0, abs=0.02)
+    with pytest.raises(ReconstructionError, match="--energy paper is orthographic"):
+        Reconstruction(PERSPECTIVE, settings)
+
+
+@pytest.mark.parametrize("modes", [POINTS, 500])
+@pytest.mark.parametrize("given", [True, False])
+def test_more_modes_than_points_are_refused_at_once(modes: int, given: bool) -> None:
+    W, truth = bending_sheet()
+    with pytest.raises(ReconstructionError, match=rf"--modes {modes} does not fit {POINTS} points"):
+        reconstruct(W[:1], settings=Settings(modes=modes), truth=truth if given else None)
+
+
+def test_robust_weights_spare_the_crowd() -> None:
+    rng = np.random.default_rng(0)
+    residuals = rng.normal(size=(2, 100))
+    residuals[:, :5] += 60
+    visible = np.ones(100, bool)
+    visible[95:] = False
+    weights = robust_weights(residuals, visible)
+    assert weights[:5].max() < 0.05
+    assert weights[5:95].min() > 0.9
+    np.testing.assert_array_equal(weights[95:], 0.0)
