@@ -1,0 +1,85 @@
+"""Writing a video: frames go in, a file appears when it is complete."""
+
+import shutil
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.errors import UsageError
+
+Image = NDArray[np.uint8]
+
+CODECS = {".mp4": "mp4v", ".webm": "VP80"}
+FULL_BYTES = 2**20  # so little left on a disk explains a failure
+
+
+class VideoSink:
+    """A video being written; a context manager.
+
+    .mp4 (MPEG-4 part 2) is written fast and plays in every player, but not in browsers; .webm (VP8) plays there too.
+
+    Args:
+        path: the file, .mp4 or .webm.
+        size: (width, height) px of the frames.
+        fps: frames per second.
+
+    Raises:
+        UsageError: another format, or the file cannot be written.
+    """
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
+        check_video_format(path)
+        self.path = path
+        self._part = path.with_name(f"{path.stem}.part{path.suffix}")
+        self._size = size
+        codec = CODECS[path.suffix.lower()]
+        # Containers store a rate as a fraction: three digits are enough for it to be a short one.
+        self._writer = cv2.VideoWriter(str(self._part), cv2.VideoWriter.fourcc(*codec), round(fps, 3), size)
+        if not self._writer.isOpened():
+            self._part.unlink(missing_ok=True)
+            raise UsageError(f"cannot write {path}: this OpenCV has no {codec} encoder, or the folder is not writable")
+        self._frames = 0
+
+    def write(self, image: Image) -> None:
+        """The next frame, (H, W, 3) BGR."""
+        assert image.shape[1::-1] == self._size, "OpenCV would drop the frame without a word"
+        self._writer.write(image)
+        self._frames += 1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._writer.release()
+        try:
+            if kind is None:
+                self._check()
+                self._part.replace(self.path)
+        finally:
+            self._part.unlink(missing_ok=True)
+
+    def _check(self) -> None:
+        """OpenCV does not say when a disk is full: the file must open again, and have room left beside it."""
+        if self._frames == 0:
+            raise UsageError(f"cannot write {self.path}: there is no frame to write")
+        full = shutil.disk_usage(self._part.parent).free < FULL_BYTES
+        written = cv2.VideoCapture(str(self._part))
+        complete = written.isOpened() and written.read()[0]
+        written.release()
+        if full or not complete:
+            reason = "the disk is full" if full else "the file does not open again"
+            raise UsageError(f"cannot write {self.path}: {reason}; free some space or choose another place")
+
+
+def check_video_format(path: Path) -> None:
+    """See to it that a video of that name can be written.
+
+    Raises:
+        UsageError: neither .mp4 nor .webm.
+    """
+    if path.suffix.lower() not in CODECS:
+        raise UsageError(f"cannot write {path}: videos are written as {' or '.join(CODECS)}")
