@@ -98,7 +98,7 @@ def as_words(playback: Playback, measured: Measures) -> Words:
         "rest_shape_note": summary.get("rest_shape_note", infos[0] if infos and playback.modelled else None),
         "deformation": summary.get("deformation", playback.configuration.get("deformation")),
         "points": playback.visible.shape[1],
-        "modes": playback.Lambda.shape[2],
+        "modes": playback.Lambda.shape[2] if playback.modelled else playback.configuration.get("modes"),
         "visible_share": {
             "mean": float(measured.visible_share.mean()),
             "min": float(measured.visible_share.min()),
@@ -117,9 +117,14 @@ def as_words(playback: Playback, measured: Measures) -> Words:
         },
         "fps": summary.get("fps"),
     }
-    words |= {name: summary.get(name) for name in SCORES}
+    words |= finite({name: summary.get(name) for name in SCORES})
     events = [{"frame": frame, "time_s": t, "level": level, "text": text} for frame, t, level, text in playback.events]
-    return words | {"notes": list(playback.notes), "events": events, "configuration": playback.configuration}
+    return words | {"notes": list(playback.notes), "events": events, "configuration": finite(playback.configuration)}
+
+
+def finite(values: Words) -> Words:
+    """The same without what JSON has no number for, as an orthographic camera's focal length."""
+    return {name: None if isinstance(v, float) and not np.isfinite(v) else v for name, v in values.items()}
 
 
 def statistics(values: Array) -> dict[str, float]:

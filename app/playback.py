@@ -33,6 +33,7 @@ DOCUMENT = "modeshape.Document:"
 POSITIONS = "Points2D:positions"
 SCALARS = "Scalars:scalars"
 NAME = ("__properties", "RecordingInfo:name")
+STAGES = ("decode", "track", "reconstruct", "record")  # in this order, before any others
 TEXTURE = "Mesh3D:albedo_texture_"
 
 
@@ -155,7 +156,8 @@ class Playback:
             notes.append(f"{file.path} is of a run that was ended before it was complete: it has no summary")
         if modelled is None:
             notes.append(f"{file.path} contains no shapes: the run ended before its rest shape was found")
-        stages = [e for e, c in rows.found if e.startswith(f"{entities.TIMING}/") and c == SCALARS]
+        found = [e.split("/", 1)[1] for e, c in rows.found if e.startswith(f"{entities.TIMING}/") and c == SCALARS]
+        stages = sorted(found, key=lambda stage: STAGES.index(stage) if stage in STAGES else len(STAGES))
         texts = {row.id: cast(list[str], row.value)[0] for row in rows.all(entities.EVENTS, "TextLog:text")}
         levels = {row.id: cast(list[str], row.value)[0] for row in rows.all(entities.EVENTS, "TextLog:level")}
         names = rows.last(*NAME)
@@ -169,7 +171,7 @@ class Playback:
             frames=np.array(numbers, np.int64),
             times_s=np.array([observed[k].time_s for k in numbers]),
             phases=[cast(list[str], phases[k].value)[0] for k in numbers],
-            stage_ms={entity.split("/", 1)[1]: by_frame(entity, SCALARS, 1)[:, 0] for entity in stages},
+            stage_ms={stage: by_frame(f"{entities.TIMING}/{stage}", SCALARS, 1)[:, 0] for stage in stages},
             events=[
                 (row.frame, row.time_s, levels.get(row.id, "INFO"), texts[row.id])
                 for row in rows.all(entities.EVENTS, "TextLog:text")

@@ -18,6 +18,9 @@ from app.summary import as_json
 
 Reviewed = tuple[Playback, Measures]
 
+# Parts of the configuration that have a row of their own, or say nothing about the result.
+ELSEWHERE = ("source", "out", "overwrite", "tracks_out", "shapes_out", "view", "connect", "json")
+
 
 def review(command: Review, progress: Progress) -> None:
     """Carry out the command.
@@ -31,6 +34,11 @@ def review(command: Review, progress: Progress) -> None:
         from app.plots import check_format  # Matplotlib takes its time, and is not always wanted
 
         check_format(command.plot)
+    url = None
+    if command.connect:
+        from app.viewer import running_viewer
+
+        url = running_viewer(command.connect)
     reviewed: list[Reviewed] = []
     for path in (command.recording, command.other):
         if path is not None:
@@ -50,12 +58,11 @@ def review(command: Review, progress: Progress) -> None:
         as_json(words[0] if len(words) == 1 else {"recordings": words})
     else:
         print_table(words)
-    if command.view or command.connect:
+    if url or command.view:
         from app.show import show
-        from app.viewer import running_viewer, spawned_viewer
+        from app.viewer import spawned_viewer
 
-        url = running_viewer(command.connect) if command.connect else spawned_viewer()
-        show([playback for playback, _ in reviewed], url)
+        show([playback for playback, _ in reviewed], url or spawned_viewer())
 
 
 def write_csv(path: Path, reviewed: list[Reviewed]) -> None:
@@ -81,8 +88,10 @@ def print_table(words: list[Words]) -> None:
     columns = [as_rows(one) for one in words]
     if len(words) == 2:
         columns = [shared_configuration(mine, other) for mine, other in zip(columns, reversed(columns), strict=True)]
-    table = Table(title="modeshape review", show_header=False, title_justify="left", show_lines=len(words) > 1)
+    table = Table(title="modeshape review", show_header=False, title_justify="left", row_styles=["", "dim"])
     table.add_column(no_wrap=True)
+    for _ in words:
+        table.add_column(overflow="fold", ratio=1)
     for name in dict.fromkeys(name for column in columns for name in column):
         cells = [column.get(name, "") for column in columns]
         if any(cells):
@@ -119,7 +128,8 @@ def as_rows(words: Words) -> dict[str, str]:
         rows[name] = f"{words[name]:.2%}" if words[name] is not None else ""
     rows["events"] = "\n".join(f"{e['frame']}: {e['text']}" for e in events if e["text"] != note)
     rows["notes"] = "\n".join(cast(list[str], words["notes"]))
-    rows["configuration"] = "\n".join(f"{k} {v}" for k, v in cast(Words, words["configuration"]).items() if v is not None)
+    configuration = cast(Words, words["configuration"]).items()
+    rows["configuration"] = "\n".join(f"{k} {v}" for k, v in configuration if v is not None and k not in ELSEWHERE)
     return {name: text for name, text in rows.items() if text}
 
 
