@@ -11,6 +11,7 @@ from app.blueprint import blueprint
 from app.errors import UsageError
 
 FLUSH_SECONDS = 10.0  # a viewer that hangs must not stop a run
+TICK_S = 1.0  # between two writes to the file: fewer, larger pieces; a killed run loses so much
 FULL_BYTES = 2**20  # so little left on a disk explains a failure
 
 Loggable = rr.AsComponents | Iterable[rr.DescribedComponentBatch]
@@ -29,7 +30,8 @@ class Stream:
         sinks: list[rr.FileSink | rr.GrpcSink] = [rr.GrpcSink(url) for url in dict.fromkeys(urls)]
         if path is not None:
             sinks.append(rr.FileSink(path))
-        self._stream = rr.RecordingStream(entities.APPLICATION) if sinks else None
+        batches = rr.ChunkBatcherConfig(flush_tick=TICK_S) if not urls else None  # a viewer wants every frame at once
+        self._stream = rr.RecordingStream(entities.APPLICATION, batcher_config=batches) if sinks else None
         if self._stream is None:
             return
         try:
