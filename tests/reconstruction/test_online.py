@@ -9,7 +9,8 @@ from reconstruction import ReconstructionError, rest_shape
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.model import ShapeEstimate
-from reconstruction.online import Deformation, Phase, Reconstruction, Settings, robust_weights
+from reconstruction.online import Deformation, Phase, Reconstruction, Settings
+from reconstruction.window import robust_weights
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, flat, relief, rolled, seen, turn, turns
 
 FRAMES, POINTS = 26, 70
@@ -92,7 +93,7 @@ def test_auto_takes_a_sheet_for_inextensible() -> None:
 
 def test_a_solid_is_factorised_then_deformed() -> None:
     W, truth = swelling_hill(ORTHOGRAPHIC)
-    settings = replace(SETTINGS, rest_shape="rigid", bootstrap_frames=12)
+    settings = Settings(modes=16, rest_shape="rigid", bootstrap_frames=12)
     reconstruction, estimates = reconstruct(W, ORTHOGRAPHIC, settings)
     assert reconstruction.rest is not None
     assert reconstruction.rest.kind == "rigid"
