@@ -93,14 +93,20 @@ def test_auto_takes_a_sheet_for_inextensible() -> None:
 
 def test_a_solid_is_factorised_then_deformed() -> None:
     W, truth = swelling_hill(ORTHOGRAPHIC)
-    settings = Settings(modes=16, rest_shape="rigid", bootstrap_frames=12)
+    settings = replace(SETTINGS, rest_shape="rigid", bootstrap_frames=12)
     reconstruction, estimates = reconstruct(W, ORTHOGRAPHIC, settings)
     assert reconstruction.rest is not None
     assert reconstruction.rest.kind == "rigid"
     assert reconstruction.bootstrap_frames == 12
     assert reconstruction.deformation == "general"
     assert [e.frame for e in estimates] == list(range(FRAMES))
-    assert error(estimates, truth) < 0.6 * static_error(reconstruction, truth)
+    per_frame = e3d(shapes_of(estimates), truth)
+    still = e3d(np.broadcast_to(reconstruction.rest.motion.shape, truth.shape), truth)
+    assert per_frame[:15].max() < 0.02  # rigid
+    swollen = still > 0.1
+    assert swollen.sum() > 5
+    # Half of what swells in depth is not seen by an orthographic camera that turns by a few degrees meanwhile.
+    assert per_frame[swollen].mean() < 0.85 * still[swollen].mean()
 
 
 def test_shapes_of_the_bootstrap_come_when_it_is_over() -> None:
