@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,24 @@ class Measures:
     def mean_px(self) -> Array:
         """(F,) mean reprojection error."""
         return by_frame(self.residual_px, lambda seen: float(seen.mean()))
+
+
+class Reviewed(NamedTuple):
+    """A recording under review."""
+
+    playback: Playback
+    measured: Measures
+    label: str
+    """What tells it from the other."""
+    place: int
+    """0 for the first, 1 for the second."""
+
+
+def reviewed(playbacks: list[Playback]) -> list[Reviewed]:
+    """Recordings with their measures, labelled by the names of their files, or by the paths if the names are equal."""
+    stems = [playback.path.stem for playback in playbacks]
+    labels = stems if len(set(stems)) == len(stems) else [str(playback.path) for playback in playbacks]
+    return [Reviewed(one, measures(one), labels[k], k) for k, one in enumerate(playbacks)]
 
 
 def by_frame(residual_px: Array, measure: Callable[[Array], float]) -> Array:
@@ -152,8 +171,9 @@ def worst_frames(frames: NDArray[np.int64], times_s: Array, rms_px: Array) -> li
     return [{"frame": int(frames[i]), "time_s": float(times_s[i]), "rms_px": float(rms_px[i])} for i in chosen]
 
 
-def per_frame(playback: Playback, measured: Measures) -> dict[str, list[object]]:
+def per_frame(one: Reviewed) -> dict[str, list[object]]:
     """Columns with one entry per frame; NaN as None."""
+    playback, measured = one.playback, one.measured
     numbers: dict[str, Array] = {
         "visible_share": measured.visible_share,
         "error_rms_px": measured.rms_px,
@@ -164,7 +184,7 @@ def per_frame(playback: Playback, measured: Measures) -> dict[str, list[object]]
         **{f"Lambda_{row}_px": np.linalg.norm(playback.Lambda[:, k], axis=1) for k, row in enumerate(ROWS)},
     }
     return {
-        "recording": [playback.name] * len(playback.frames),
+        "recording": [one.label] * len(playback.frames),
         "frame": playback.frames.tolist(),
         "time_s": playback.times_s.tolist(),
         "phase": list(playback.phases),

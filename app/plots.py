@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from app.errors import UsageError
-from app.measures import Measures, phase_ranges
-from app.playback import Playback
+from app.measures import Reviewed, phase_ranges
 
 FORMATS = (".png", ".pdf", ".svg")
 COLORS = ("#0072B2", "#D55E00")  # of the first and the second recording; told apart by all eyes
@@ -21,8 +20,6 @@ BOOTSTRAP_COLOR, LOST_COLOR = "#eeeeee", "#fbdcdc"
 ROWS = (r"$\Gamma_\alpha$", r"$\Gamma_\beta$", r"$\Gamma_\tau$")
 DPI = 160
 WIDTH_INCHES = 10.0
-
-Reviewed = tuple[Playback, Measures]
 
 
 def check_format(path: Path) -> None:
@@ -65,11 +62,11 @@ def write_review(file: BinaryIO, suffix: str, reviewed: list[Reviewed]) -> None:
 
 def review_figure(reviewed: list[Reviewed]) -> Figure:
     """Error, share of the points seen, Λ and time over the frames, one below the other; at the right what has no frame."""
-    shaped = [r for r in reviewed if r[0].modelled is not None and r[0].shaped.any()]
+    shaped = [one for one in reviewed if one.playback.modelled is not None and one.playback.shaped.any()]
     maps = 3 * len(shaped)
     heights = [1.7, 1.0, *[0.95] * maps, 1.5]
     figure = Figure(figsize=(WIDTH_INCHES, 1.25 * sum(heights) + 0.3), layout="constrained")
-    figure.suptitle(" versus ".join(playback.path.name for playback, _ in reviewed), fontsize=10, x=0.01, ha="left")
+    figure.suptitle(" versus ".join(one.label for one in reviewed), fontsize=10, x=0.01, ha="left")
     grid = figure.add_gridspec(len(heights), 3, width_ratios=[4, 0.12, 1], height_ratios=heights)  # a gap for the color bar
     over_frames = [figure.add_subplot(grid[row, 0]) for row in range(len(heights))]
     first, last = frame_range(reviewed)
@@ -91,8 +88,8 @@ def review_figure(reviewed: list[Reviewed]) -> Figure:
 
 def frame_range(reviewed: list[Reviewed]) -> tuple[int, int]:
     """First and last frame of all."""
-    firsts = [int(playback.frames[0]) for playback, _ in reviewed]
-    lasts = [int(playback.frames[-1]) for playback, _ in reviewed]
+    firsts = [int(one.playback.frames[0]) for one in reviewed]
+    lasts = [int(one.playback.frames[-1]) for one in reviewed]
     return min(firsts), max(lasts)
 
 
@@ -100,7 +97,7 @@ def shade_phases(axes: Axes, reviewed: list[Reviewed]) -> None:
     """Mark the bootstrap and where the object was lost; not of two recordings, they would overlap."""
     if len(reviewed) > 1:
         return
-    for name, first, last in phase_ranges(reviewed[0][0]):
+    for name, first, last in phase_ranges(reviewed[0].playback):
         color = {"bootstrap": BOOTSTRAP_COLOR, "lost": LOST_COLOR}.get(name.lower())
         if color:
             axes.axvspan(first - 0.5, last + 0.5, color=color, linewidth=0, zorder=0)
@@ -124,11 +121,11 @@ def place_legend(axes: Axes) -> None:
 def draw_error(axes: Axes, reviewed: list[Reviewed]) -> None:
     """Median with the 5th to 95th percentile, RMS dashed."""
     shade_phases(axes, reviewed)
-    for (playback, measured), color in zip(reviewed, COLORS, strict=False):
+    for playback, measured, label, place in reviewed:
         low, median, high = (measured.errors(q) for q in (5, 50, 95))
-        axes.fill_between(playback.frames, low, high, color=color, alpha=0.18, linewidth=0)
-        axes.plot(playback.frames, median, color=color, label=playback.path.stem)
-        axes.plot(playback.frames, measured.rms_px, color=color, linewidth=0.8, linestyle=(0, (3, 2)))
+        axes.fill_between(playback.frames, low, high, color=COLORS[place], alpha=0.18, linewidth=0)
+        axes.plot(playback.frames, median, color=COLORS[place], label=label)
+        axes.plot(playback.frames, measured.rms_px, color=COLORS[place], linewidth=0.8, linestyle=(0, (3, 2)))
     axes.set_ylim(bottom=0)
     axes.set_ylabel("px")
     axes.set_title("Reprojection error: median, 5–95 % (band), RMS (dashed)")
@@ -137,9 +134,9 @@ def draw_error(axes: Axes, reviewed: list[Reviewed]) -> None:
 
 def draw_share(axes: Axes, reviewed: list[Reviewed]) -> None:
     """Share of the points seen."""
-    for (playback, measured), color in zip(reviewed, COLORS, strict=False):
-        axes.plot(playback.frames, 100 * measured.visible_share, color=color)
-    lowest = 100 * min(float(measured.visible_share.min()) for _, measured in reviewed)
+    for playback, measured, _, place in reviewed:
+        axes.plot(playback.frames, 100 * measured.visible_share, color=COLORS[place])
+    lowest = 100 * min(float(measured.visible_share.min()) for _, measured, *_ in reviewed)
     axes.set_ylim(max(0.0, lowest - 0.15 * (102 - lowest)), 100 + 0.05 * (102 - lowest))
     axes.set_ylabel("%")
     axes.set_title("Points seen")
@@ -147,11 +144,11 @@ def draw_share(axes: Axes, reviewed: list[Reviewed]) -> None:
 
 def draw_coefficients(maps: list[Axes], shaped: list[Reviewed]) -> None:
     """Λ over time: for each recording a map per row Γ, its modes downwards; one scale for all."""
-    limit = max(float(np.nanmax(np.abs(playback.Lambda), initial=0.0)) for playback, _ in shaped) or 1.0
+    limit = max(float(np.nanmax(np.abs(playback.Lambda), initial=0.0)) for playback, *_ in shaped) or 1.0
     # Bending is far larger than stretching: the scale is linear only near zero, so that both show.
     scale = AsinhNorm(limit / 50, -limit, limit)
-    for n, (playback, _) in enumerate(shaped):
-        modes, name = playback.Lambda.shape[2], f" of {playback.path.stem}" if len(shaped) > 1 else ""
+    for n, (playback, _, label, _) in enumerate(shaped):
+        modes, name = playback.Lambda.shape[2], f" of {label}" if len(shaped) > 1 else ""
         edges = np.append(playback.frames - 0.5, playback.frames[-1] + 0.5)
         for k, row in enumerate(ROWS):
             axes, values = maps[3 * n + k], playback.Lambda[:, k].T
@@ -174,40 +171,40 @@ def draw_coefficients(maps: list[Axes], shaped: list[Reviewed]) -> None:
 def draw_time(axes: Axes, reviewed: list[Reviewed]) -> None:
     """Milliseconds a frame: of one recording by stage, stacked; of two their sums."""
     if len(reviewed) == 1:
-        [(playback, _)] = reviewed
+        playback = reviewed[0].playback
         stages = list(playback.stage_ms.items())
         if stages:
             heights, colors = [np.nan_to_num(values) for _, values in stages], STAGE_COLORS[: len(stages)]
             axes.stackplot(playback.frames, heights, labels=[name for name, _ in stages], colors=colors, linewidth=0)
             place_legend(axes)
     else:
-        for (playback, measured), color in zip(reviewed, COLORS, strict=False):
-            axes.plot(playback.frames, measured.total_ms, color=color, linewidth=0.8)
-    totals = np.concatenate([measured.total_ms[np.isfinite(measured.total_ms)] for _, measured in reviewed])
+        for playback, measured, _, place in reviewed:
+            axes.plot(playback.frames, measured.total_ms, color=COLORS[place], linewidth=0.8)
+    totals = np.concatenate([measured.total_ms[np.isfinite(measured.total_ms)] for _, measured, *_ in reviewed])
     if totals.size:
         top = 1.15 * float(np.percentile(totals, 99))
         axes.set_ylim(0, top)
-        slowest = max(reviewed, key=lambda one: float(np.nanmax(one[1].total_ms, initial=0.0)))
-        at = int(np.argmax(np.nan_to_num(slowest[1].total_ms)))
-        if slowest[1].total_ms[at] > top:
-            text, place = f"{slowest[1].total_ms[at]:.0f} ms", (slowest[0].frames[at], top)
-            axes.annotate(text, place, (4, -3), textcoords="offset points", va="top", fontsize=7)
+        slowest = max(reviewed, key=lambda one: float(np.nanmax(one.measured.total_ms, initial=0.0)))
+        at = int(np.argmax(np.nan_to_num(slowest.measured.total_ms)))
+        if slowest.measured.total_ms[at] > top:
+            text, tip = f"{slowest.measured.total_ms[at]:.0f} ms", (slowest.playback.frames[at], top)
+            axes.annotate(text, tip, (4, -3), textcoords="offset points", va="top", fontsize=7)
     axes.set_ylabel("ms")
     axes.set_title("Time per frame")
 
 
 def draw_stages(axes: Axes, reviewed: list[Reviewed]) -> None:
     """Median milliseconds of each stage, with a line up to the 95th percentile."""
-    names = list(dict.fromkeys(name for playback, _ in reviewed for name in playback.stage_ms))
+    names = list(dict.fromkeys(name for one in reviewed for name in one.playback.stage_ms))
     width = 0.8 / len(reviewed)
-    for n, (playback, _) in enumerate(reviewed):
+    for playback, _, _, place in reviewed:
         for k, name in enumerate(names):
             values = playback.stage_ms.get(name, np.empty(0))
             values = values[np.isfinite(values)]
             if values.size:
                 median, high = np.percentile(values, (50, 95))
-                color = STAGE_COLORS[k % len(STAGE_COLORS)] if len(reviewed) == 1 else COLORS[n]
-                y = k + (n - (len(reviewed) - 1) / 2) * width
+                color = STAGE_COLORS[k % len(STAGE_COLORS)] if len(reviewed) == 1 else COLORS[place]
+                y = k + (place - (len(reviewed) - 1) / 2) * width
                 axes.barh(y, median, 0.9 * width, color=color, xerr=[[0], [high - median]], error_kw={"lw": 0.8})
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.4, -0.6)
@@ -219,10 +216,10 @@ def draw_stages(axes: Axes, reviewed: list[Reviewed]) -> None:
 def draw_distribution(axes: Axes, shaped: list[Reviewed]) -> None:
     """Which share of all points' reprojection errors is below a number of pixels."""
     percent = np.linspace(0, 100, 201)
-    for (_, measured), color in zip(shaped, COLORS, strict=False):
+    for _, measured, _, place in shaped:
         errors = measured.residual_px[np.isfinite(measured.residual_px)]
         if errors.size:
-            axes.semilogx(np.maximum(np.percentile(errors, percent), 0.01), percent, color=color)
+            axes.semilogx(np.maximum(np.percentile(errors, percent), 0.01), percent, color=COLORS[place])
     axes.set_ylim(0, 101)
     axes.set_xlabel("px")
     axes.set_title("% of errors below")
@@ -230,10 +227,10 @@ def draw_distribution(axes: Axes, shaped: list[Reviewed]) -> None:
 
 def draw_spectrum(axes: Axes, shaped: list[Reviewed]) -> None:
     """Eigenvalues of −½CDC, as shares of the first."""
-    for n, (playback, _) in enumerate(shaped):
+    for playback, _, _, place in shaped:
         values = playback.basis.eigenvalues
         share = np.where(values > 0, values / values[0], np.nan)  # others have no logarithm
-        style = {"color": COLORS[n], "marker": "os"[n], "markersize": 3, "linewidth": 0.8}
+        style = {"color": COLORS[place], "marker": "os"[place], "markersize": 3, "linewidth": 0.8}
         axes.semilogy(np.arange(1, len(values) + 1), share, **style)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("mode")

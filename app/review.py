@@ -10,13 +10,11 @@ from rich.console import Console
 from rich.table import Table
 
 from app.config import Review, Words
-from app.measures import Measures, as_words, measures, per_frame
+from app.measures import Reviewed, as_words, per_frame, reviewed
 from app.playback import Playback
 from app.progress import Progress
 from app.results import check_free, writable
 from app.summary import as_json
-
-Reviewed = tuple[Playback, Measures]
 
 # Parts of the configuration that have a row of their own, or say nothing about the result.
 ELSEWHERE = ("source", "out", "overwrite", "tracks_out", "shapes_out", "view", "connect", "json")
@@ -39,21 +37,19 @@ def review(command: Review, progress: Progress) -> None:
         from app.viewer import running_viewer
 
         url = running_viewer(command.connect)
-    reviewed: list[Reviewed] = []
-    for path in (command.recording, command.other):
-        if path is not None:
-            playback = Playback.load(path)
-            for note in playback.notes:
-                progress.say(note)
-            reviewed.append((playback, measures(playback)))
+    playbacks = [Playback.load(path) for path in (command.recording, command.other) if path is not None]
+    for playback in playbacks:
+        for note in playback.notes:
+            progress.say(note)
+    both = reviewed(playbacks)
     if command.csv:
-        write_csv(command.csv, reviewed)
+        write_csv(command.csv, both)
     if command.plot:
         from app.plots import write_review
 
         with writable(command.plot) as file:
-            write_review(file, command.plot.suffix, reviewed)
-    words = [as_words(*one) for one in reviewed]
+            write_review(file, command.plot.suffix, both)
+    words = [as_words(one.playback, one.measured) for one in both]
     if command.json:
         as_json(words[0] if len(words) == 1 else {"recordings": words})
     else:
@@ -62,16 +58,16 @@ def review(command: Review, progress: Progress) -> None:
         from app.show import show
         from app.viewer import spawned_viewer
 
-        show([playback for playback, _ in reviewed], url or spawned_viewer())
+        show(both, url or spawned_viewer())
 
 
-def write_csv(path: Path, reviewed: list[Reviewed]) -> None:
+def write_csv(path: Path, both: list[Reviewed]) -> None:
     """One row per frame and recording, under one heading; what is not known is empty.
 
     Raises:
         UsageError: the file cannot be written.
     """
-    tables = [per_frame(*one) for one in reviewed]
+    tables = [per_frame(one) for one in both]
     names = list(dict.fromkeys(name for table in tables for name in table))
     with writable(path) as file:
         text = io.TextIOWrapper(file, "utf-8", newline="", write_through=True)

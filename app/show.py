@@ -6,30 +6,43 @@ from rerun.chunk import Chunk
 
 from app import entities
 from app.blueprint import blueprint
-from app.playback import Playback
+from app.measures import Reviewed
 
 SIDES = ("left", "right")
+COLORS = (((90, 170, 255), (160, 205, 255)), ((255, 140, 60), (255, 200, 160)))  # strong, pale
 BACKGROUND = (24, 26, 32)
 
 
-def show(playbacks: list[Playback], url: str) -> None:
+def show(reviewed: list[Reviewed], url: str) -> None:
     """Send one or two recordings to the viewer that listens at `url`.
 
     Two become one recording with an entity for each side, since a viewer shows one recording at a time.
     """
-    name = " | ".join(playback.path.stem for playback in playbacks)
-    stream = rr.RecordingStream(entities.APPLICATION if len(playbacks) == 1 else f"{entities.APPLICATION}-comparison")
-    layout = blueprint() if len(playbacks) == 1 else comparison([playback.path.stem for playback in playbacks])
+    two = len(reviewed) > 1
+    stream = rr.RecordingStream(f"{entities.APPLICATION}-comparison" if two else entities.APPLICATION)
+    layout = comparison([one.label for one in reviewed]) if two else blueprint()
     stream.set_sinks(rr.GrpcSink(url), default_blueprint=layout)
-    stream.send_recording_name(name)
+    stream.send_recording_name(" | ".join(one.label for one in reviewed))
     try:
-        for playback, side in zip(playbacks, SIDES, strict=False):
-            for chunk in playback.file:
+        for one, side in zip(reviewed, SIDES, strict=False):
+            for chunk in one.playback.file:
                 if not chunk.entity_path.startswith("/__"):  # properties, as the name
-                    rr.send_chunks(chunk if len(playbacks) == 1 else moved(chunk, side), recording=stream)
+                    rr.send_chunks(moved(chunk, side) if two else chunk, recording=stream)
+            if two:
+                tell_apart(stream, one, side)
         stream.flush()
     finally:
         stream.disconnect()
+
+
+def tell_apart(stream: rr.RecordingStream, one: Reviewed, side: str) -> None:
+    """Name the curves after their recording, in its colours."""
+    strong, pale = COLORS[one.place]
+    curves = [(entities.ERROR, ["RMS", "median"], [pale, strong]), (entities.VISIBLE, ["seen"], [strong])]
+    curves += [(f"{entities.TIMING}/{stage}", [stage], [strong]) for stage in one.playback.stage_ms]
+    for entity, names, colors in curves:
+        lines = rr.SeriesLines(names=[f"{name}, {one.label}" for name in names], colors=colors)
+        stream.log(f"{side}/{entity}", lines, static=True)
 
 
 def moved(chunk: Chunk, side: str) -> Chunk:
