@@ -21,6 +21,7 @@ Flags = NDArray[np.bool_]
 
 ROUNDS = 20  # of passing on, from neighbour to neighbour, how far the points are seen off the shape
 OUTLIER_PX = 1.5  # a point farther off than its neighbours by this counts half
+PAPER = 0.95  # of a picture's full white is what bare paper shows
 FEATHER_PX = 0.6  # half-resolution px, of the outline of what is in front
 
 
@@ -89,8 +90,8 @@ class Compositor:
         view = shading.View(view.seen, view.predicted * gains, view.variance, view.inside)
         last = self._shade[half]
         corner = (surface.left, surface.top)
-        hidden = in_front(view, last, self._hidden[half], (points - corner - 0.5) / 2, visible)
-        shade = shading.shading(view, view.inside * (1 - hidden), last)
+        hidden, agreement = in_front(view, last, self._hidden[half], (points - corner - 0.5) / 2, visible)
+        shade = shading.shading(view, view.inside * (1 - hidden) * agreement, last)
         self._hidden[:], self._shade[half] = 0, shade
         self._hidden[half] = hidden
         return self._blended(image, surface, picture, shade[..., None] * gains, hidden)
@@ -123,7 +124,7 @@ class Compositor:
             self._levels = (picture, Levels(picture, self._place))
         layer = self._levels[1].seen(surface.uv, surface.cover)
         uv = shading.halved(surface.uv)
-        white = shading.quadratic(uv[..., 0], uv[..., 1], self._first.shape) @ self._white
+        white = shading.quadratic(uv[..., 0], uv[..., 1], self._first.shape) @ self._white / PAPER
         light = light * np.clip(white, 0.2, 1.2)[..., None].astype(np.float32)
         light = cv2.resize(light, (w, h), interpolation=cv2.INTER_LINEAR)
         behind = cv2.GaussianBlur(hidden.astype(np.float32), (0, 0), FEATHER_PX)
