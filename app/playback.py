@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import entities
-from app.chunks import STATIC, RecordingFile, Rows
+from app.chunks import STATIC, RecordingFile
 from app.errors import UsageError
 from app.stored_images import stored_images
+from app.stored_model import MODEL, TEXTURE, Modelled, modelled_part
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.energy import State
 from reconstruction.mesh import Mesh
@@ -26,7 +27,6 @@ from reconstruction.modes import ModalBasis
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
-MODEL = "modeshape.Model:"
 ESTIMATE = "modeshape.Estimate:"
 OBSERVATION = "modeshape.Observation:"
 DOCUMENT = "modeshape.Document:"
@@ -34,26 +34,6 @@ POSITIONS = "Points2D:positions"
 SCALARS = "Scalars:scalars"
 NAME = ("__properties", "RecordingInfo:name")
 STAGES = ("decode", "track", "reconstruct", "record")  # in this order, before any others
-TEXTURE = "Mesh3D:albedo_texture_"
-
-
-@dataclass(frozen=True)
-class Modelled:
-    """The part of a recording that is there once the bootstrap is over.
-
-    Attributes:
-        model: rest shape, modes, mesh and camera.
-        size: (width, height) of the picture, px.
-        texture_px: (P, 2) the vertices in the first frame.
-        texture_bgr: (h, w, 3) the part of the first frame that they cover.
-        texture_origin: (2,) px of that part in the frame.
-    """
-
-    model: Model
-    size: tuple[int, int]
-    texture_px: Array
-    texture_bgr: Image
-    texture_origin: NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -284,27 +264,3 @@ def wanted(entity: str, component: str) -> bool:
         return component == SCALARS
     ours = (MODEL, ESTIMATE, OBSERVATION, DOCUMENT, "TextLog:")
     return (entity, component) == NAME or component.startswith(ours)
-
-
-def modelled_part(rows: Rows) -> Modelled | None:
-    """Model and texture, or None if the recording does not have both."""
-    if not rows.last(entities.MODEL, f"{MODEL}rest") or not rows.last(entities.MESH, f"{TEXTURE}buffer"):
-        return None
-
-    def value(name: str) -> Array:
-        return cast(Array, rows.static(entities.MODEL, f"{MODEL}{name}"))
-
-    rest = value("rest").reshape(3, -1)
-    basis = ModalBasis(rest, value("Upsilon").reshape(-1, rest.shape[1]), value("eigenvalues"), value("Phi").reshape(3, 3))
-    faces, edges = (value(name).reshape(-1, width).astype(np.int64) for name, width in (("faces", 3), ("edges", 2)))
-    camera = Camera(float(value("focal_px")[0]), value("center_px"))
-    layout = cast(list[dict[str, int]], rows.static(entities.MESH, f"{TEXTURE}format"))[0]
-    rgb = np.frombuffer(cast(bytes, rows.static(entities.MESH, f"{TEXTURE}buffer")), np.uint8)
-    width, height = value("size").astype(int).tolist()
-    return Modelled(
-        model=Model(basis, Mesh(faces, edges), camera),
-        size=(width, height),
-        texture_px=value("texture_px").reshape(-1, 2),
-        texture_bgr=rgb.reshape(layout["height"], layout["width"], 3)[:, :, ::-1].copy(),
-        texture_origin=value("texture_origin").astype(np.int64),
-    )
