@@ -11,6 +11,7 @@ from typing import Annotated, NoReturn
 import tyro
 
 from app.config import Demo, Evaluate, Review, Run
+from app.config_export import Export, Modes
 from app.errors import UsageError
 
 Command = (
@@ -18,6 +19,8 @@ Command = (
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Review, tyro.conf.subcommand("review")]
+    | Annotated[Export, tyro.conf.subcommand("export")]
+    | Annotated[Modes, tyro.conf.subcommand("modes")]
 )
 
 DESCRIPTION = """One ordinary video of a deforming surface becomes a moving 3-D mesh, live.
@@ -41,7 +44,7 @@ def main() -> NoReturn:
         sys.exit(INTERRUPTED)
 
 
-def parse() -> Run | Evaluate | Demo | Review:
+def parse() -> Run | Evaluate | Demo | Review | Export | Modes:
     """The command asked for; a mistake is told in one line instead of a panel."""
     complaint = io.StringIO()
     try:
@@ -54,7 +57,7 @@ def parse() -> Run | Evaluate | Demo | Review:
         fail(" ".join(words.split()))
 
 
-def run(command: Run | Evaluate | Demo | Review) -> int:
+def run(command: Run | Evaluate | Demo | Review | Export | Modes) -> int:
     """Carry out a command; returns the exit code."""
     from app.progress import Progress
     from app.summary import as_json, as_table
@@ -73,6 +76,14 @@ def run(command: Run | Evaluate | Demo | Review) -> int:
         from app.demo_run import demo
 
         words, printed_as_json = demo(command), command.json
+    elif isinstance(command, Export):
+        from app.export import export
+
+        words, printed_as_json = export(command, Progress("reading")), command.json
+    elif isinstance(command, Modes):
+        from app.modes import modes
+
+        words, printed_as_json = modes(command, Progress("reading")), command.json
     else:
         from app.session import Session
 

@@ -37,19 +37,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Words:
     rng = np.random.default_rng(config.seed)
     W = with_noise(np.where(tracks.visible[:, None], tracks.W, np.nan), config.noise, rng)
     visible = with_missing(tracks.visible, config.missing, rng)
-    given, mesh = given_rest_shape(config, tracks)
-    choice = config.rest_shape if given is None else "auto"
-    model = config.model
-    settings = Settings(
-        rest_shape=cast(Literal["auto", "rigid", "plane"], choice),
-        bootstrap_frames=None if model.bootstrap_frames == "auto" else model.bootstrap_frames,
-        modes=model.modes,
-        metric=model.metric,
-        deformation=model.deformation,
-        window=model.window,
-        energy=model.energy,
-    )
-    reconstruction = Reconstruction(camera_of(config, tracks), settings, given, mesh)
+    reconstruction = prepare(config, tracks)
     collected = Collected(everything=True)
     with threadpool_limits(1), progress:
         progress.expect(frames)
@@ -70,7 +58,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Words:
         "tracks": str(config.tracks),
         "frames": frames,
         "points": points,
-        "modes": model.modes,
+        "modes": config.model.modes,
         "rest_shape": rest.kind,
         "rest_shape_note": rest.note,
         "bootstrap_frames": reconstruction.bootstrap_frames,
@@ -82,6 +70,27 @@ def evaluate(config: Evaluate, progress: Progress) -> Words:
         shapes = np.stack([collected.estimates[int(f)].shape for f in tracks.gt_frames])
         words |= score_words(score(shapes, rest.motion.shape, tracks.S_gt, tracks.gt_frames))
     return words
+
+
+def prepare(config: Evaluate, tracks: Tracks) -> Reconstruction:
+    """The estimator for given tracks, before their first frame.
+
+    Raises:
+        UsageError: no such rest shape or camera in the file.
+    """
+    given, mesh = given_rest_shape(config, tracks)
+    choice = config.rest_shape if given is None else "auto"
+    model = config.model
+    settings = Settings(
+        rest_shape=cast(Literal["auto", "rigid", "plane"], choice),
+        bootstrap_frames=None if model.bootstrap_frames == "auto" else model.bootstrap_frames,
+        modes=model.modes,
+        metric=model.metric,
+        deformation=model.deformation,
+        window=model.window,
+        energy=model.energy,
+    )
+    return Reconstruction(camera_of(config, tracks), settings, given, mesh)
 
 
 def given_rest_shape(config: Evaluate, tracks: Tracks) -> tuple[RestShape | None, Mesh | None]:

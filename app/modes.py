@@ -1,0 +1,95 @@
+"""`modeshape modes`: the mode shapes of a recording's or of given tracks' rest shape as a figure."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from app.config import Evaluate, Words
+from app.config_export import Modes
+from app.progress import Progress
+from app.results import check_free, writable
+from reconstruction import distances
+from reconstruction.mesh import Mesh
+from reconstruction.modes import ModalBasis, doubly_centred
+
+Array = NDArray[np.float64]
+
+
+def modes(command: Modes, progress: Progress) -> Words:
+    """Carry out the command.
+
+    Returns:
+        what was drawn.
+
+    Raises:
+        UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
+    """
+    check_free(command.out, overwrite=command.overwrite)
+    with threadpool_limits(1), progress:
+        recorded = not zipfile.is_zipfile(command.source)  # an .npz is one
+        name, basis, mesh, metric = (of_recording if recorded else of_tracks)(command, progress)
+        eigenvalues = spectrum(basis, mesh, metric)
+        png = draw(basis, mesh, eigenvalues, title(name, basis, metric), columns=command.columns)
+    with writable(command.out) as file:
+        file.write(png)
+    return {
+        "source": str(command.source),
+        "points": basis.rest.shape[1],
+        "modes": len(basis.eigenvalues),
+        "metric": metric,
+        "eigenvalues": basis.eigenvalues.tolist(),
+        "share": float(basis.eigenvalues.sum() / eigenvalues.clip(0).sum()),
+        "out": str(command.out),
+    }
+
+
+def of_recording(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, str]:
+    """Name, modes, mesh and metric of a recording."""
+    from app.playback import Playback
+
+    playback = Playback.load(command.source)
+    for note in playback.notes:
+        progress.say(note)
+    metric = str(playback.configuration.get("metric", "euclidean"))
+    return playback.name, playback.basis, playback.mesh, metric
+
+
+def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, str]:
+    """The same of tracks: their first frames are reconstructed until there is a rest shape."""
+    from app.evaluate import prepare
+    from tracking.tracks import Tracks
+
+    tracks = Tracks.load(command.source)
+    asked = Evaluate(command.source, rest_shape=command.rest_shape, camera=command.camera, model=command.model)
+    reconstruction = prepare(asked, tracks)
+    for W, visible in zip(tracks.W, tracks.visible, strict=True):
+        reconstruction.update(np.where(visible, W, np.nan), visible)
+        progress.advance("rest shape")
+        if reconstruction.rest is not None and reconstruction.window is not None:
+            break
+    else:
+        reconstruction.finish()
+    assert reconstruction.rest is not None
+    progress.say(reconstruction.rest.note)
+    return Path(command.source).stem, reconstruction.model.basis, reconstruction.model.mesh, command.model.metric
+
+
+def spectrum(basis: ModalBasis, mesh: Mesh, metric: str) -> Array:
+    """All eigenvalues (p,) of −½CDC, descending."""
+    D = distances.manhattan(basis.rest, mesh.edges) if metric == "manhattan" else distances.euclidean(basis.rest)
+    return np.asarray(np.linalg.eigvalsh(doubly_centred(D))[::-1], np.float64)
+
+
+def title(name: str, basis: ModalBasis, metric: str) -> str:
+    """The figure's headline."""
+    return f"Mode shapes of {name}: {basis.rest.shape[1]} points, {metric} distances"
+
+
+def draw(basis: ModalBasis, mesh: Mesh, eigenvalues: Array, headline: str, *, columns: int) -> bytes:
+    """The figure as a PNG."""
+    from app.modes_figure import modes_figure
+
+    return modes_figure(basis, mesh, eigenvalues, title=headline, columns=columns)
