@@ -109,7 +109,10 @@ class Playback:
             raise UsageError(f"{file.path} contains no frame: the run ended before its first, or its start was lost")
         visible = np.stack([cast(NDArray[np.bool_], observed[k].value) for k in numbers])
         points = np.full((*visible.shape, 2), np.nan)
-        points[visible] = np.concatenate([cast(Array, seen[k].value) for k in numbers])
+        positions = np.concatenate([cast(Array, seen[k].value) for k in numbers])
+        if len(positions) != visible.sum():
+            raise ValueError("the points and their visibility disagree")
+        points[visible] = positions
         modelled = modelled_part(rows)
         modes = len(modelled.model.basis.eigenvalues) if modelled else 0
 
