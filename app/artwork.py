@@ -1,6 +1,5 @@
 """The picture that is put on a surface: a still or a video, placed in the first frame, filtered for its size there."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Self, cast
@@ -38,14 +37,12 @@ class Artwork:
         if not path.is_file():
             raise UsageError(f"no texture {path}: give a PNG, a JPEG or a video")
         self._path = path
-        self._video: Video | None = None
-        if path.suffix.lower() in STILLS:
+        self._video = None if path.suffix.lower() in STILLS else self._opened()
+        if self._video is None:
             self._picture = premultiplied(read_picture(path))
             return
-        self._open()
-        assert self._video is not None
-        self._round_s, self._fps = 0.0, self._video.fps
-        self._picture = premultiplied(self._shown.image)
+        self._begun_s = 0.0  # when the video began its present round
+        self._rewind(self._video)
 
     @property
     def moves(self) -> bool:
@@ -56,22 +53,37 @@ class Artwork:
         """What is to be seen at a time, which never goes back: (h, w, 4) BGR, premultiplied, and alpha."""
         if self._video is None:
             return self._picture
-        shown = self._shown
-        while self._round_s + self._ahead_s(shown) <= time_s:
+        while self._begun_s + self._until_s() <= time_s:
             if self._next is None:
-                self._round_s += shown.time_s + 1.0 / self._fps
-                self._open()
-                shown = self._shown
+                self._begun_s += self._until_s()
+                self._video.close()
+                self._video = self._opened()
+                self._rewind(self._video)
             else:
-                shown, self._next = self._next, next(self._frames, None)
-        if shown is not self._shown or shown.index == 0:
-            self._shown = shown
-            self._picture = premultiplied(shown.image)
+                self._show(self._next)
         return self._picture
 
-    def _ahead_s(self, shown: Frame) -> float:
-        """When, in its round, the next picture replaces the one shown."""
-        return self._next.time_s if self._next is not None else shown.time_s + 1.0 / self._fps
+    def _until_s(self) -> float:
+        """When, in its round, the picture shown has had its time."""
+        if self._next is not None:
+            return self._next.time_s
+        assert self._video is not None
+        return self._shown_s + 1.0 / self._video.fps
+
+    def _rewind(self, video: Video) -> None:
+        self._frames = iter(video)
+        self._show(next(self._frames))
+
+    def _show(self, frame: Frame) -> None:
+        self._shown_s = frame.time_s
+        self._picture = premultiplied(frame.image)
+        self._next: Frame | None = next(self._frames, None)
+
+    def _opened(self) -> Video:
+        try:
+            return Video(str(self._path))
+        except TrackingError as error:
+            raise UsageError(f"the texture {self._path} is no picture and no video that can be read: {error}") from None
 
     def __enter__(self) -> Self:
         return self
@@ -83,18 +95,6 @@ class Artwork:
         """Release a video; may be called again."""
         if self._video is not None:
             self._video.close()
-
-    def _open(self) -> None:
-        self.close()
-        try:
-            self._video = Video(str(self._path))
-            self._frames: Iterator[Frame] = iter(self._video)
-            self._shown: Frame = next(self._frames)
-            self._next: Frame | None = next(self._frames, None)
-        except TrackingError as error:
-            raise UsageError(
-                f"the texture {self._path} is neither a picture nor a video that can be read: {error}"
-            ) from None
 
 
 class Levels:
@@ -117,28 +117,25 @@ class Levels:
             half = cv2.resize(self._levels[-1], (max(1, w // 2), max(1, h // 2)), interpolation=cv2.INTER_AREA)
             self._levels.append(cast(Image, half))
 
-    def seen(self, uv: Floats, cover: Floats) -> Floats:
-        """The picture (h, w, 4) float32 where the places uv (h, w, 2) of the first frame are seen, as far as covered."""
+    def seen(self, uv: Floats, cover: Floats) -> Image:
+        """The picture (h, w, 4) where the places uv (h, w, 2) of the first frame are seen, as far as covered."""
         level = self._level(uv, cover)
         low, high = int(np.floor(level.min())), int(np.ceil(level.max()))
-        if low == high:
-            return self._sampled(low, uv)
-        h, w = cover.shape
-        full = cv2.resize(level, (w, h), interpolation=cv2.INTER_LINEAR)
-        total = np.zeros((h, w, 4), np.float32)
-        for k in range(low, high + 1):
-            share = np.clip(1.0 - np.abs(full - np.float32(k)), 0.0, 1.0)
-            total += cv2.multiply(self._sampled(k, uv), cv2.merge([share] * 4))
-        return total
+        seen = self._sampled(low, uv)
+        if high > low:
+            full = cv2.resize(level, cover.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        for k in range(low, high):
+            share = np.clip(full - np.float32(k), 0.0, 1.0)
+            seen = cast(Image, cv2.blendLinear(seen, self._sampled(k + 1, uv), 1.0 - share, share))
+        return seen
 
-    def _sampled(self, level: int, uv: Floats) -> Floats:
+    def _sampled(self, level: int, uv: Floats) -> Image:
         picture = self._levels[level]
         h, w = picture.shape[:2]
         x, y, wide, tall = self._place
         scale = np.array((w / wide, h / tall))
         places = cv2.transform(uv, np.column_stack([np.diag(scale), (0.5 - np.array((x, y))) * scale - 0.5]))
-        sampled = cv2.remap(picture, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=CLEAR)
-        return cast(Floats, sampled.astype(np.float32))
+        return cast(Image, cv2.remap(picture, places, np.empty(0), cv2.INTER_LINEAR, borderValue=CLEAR))
 
     def _level(self, uv: Floats, cover: Floats) -> Floats:
         """The level wanted, on a coarse grid: smooth, so that no step between levels is seen."""

@@ -126,16 +126,16 @@ class Compositor:
         uv = shading.halved(surface.uv)
         white = shading.quadratic(uv[..., 0], uv[..., 1], self._first.shape) @ self._white / PAPER
         light = light * np.clip(white, 0.2, 1.2)[..., None].astype(np.float32)
-        light = cv2.resize(light, (w, h), interpolation=cv2.INTER_LINEAR)
+        light = cast(Floats, cv2.resize(light, (w, h), interpolation=cv2.INTER_LINEAR))
         behind = cv2.GaussianBlur(hidden.astype(np.float32), (0, 0), FEATHER_PX)
         behind = cv2.resize(behind, (w, h), interpolation=cv2.INTER_LINEAR)
         share = surface.cover * (1 - behind) * np.float32(self._opacity)
-        alpha = cv2.merge([layer[..., 3] * share / 255] * 3)
-        colour = layer[..., :3] * light * share[..., None]
+        colour = cv2.multiply(cv2.cvtColor(layer, cv2.COLOR_BGRA2BGR), light, dtype=cv2.CV_32F)
+        colour = cv2.multiply(colour, cv2.merge([share] * 3))
+        rest = 1 - share * (layer[..., 3] * np.float32(1 / 255))
         out = even(image).copy()
         region = out[surface.region]
-        mixed = cv2.multiply(region, 1 - alpha, dtype=cv2.CV_32F) + colour
-        region[:] = np.clip(np.rint(mixed), 0, 255).astype(np.uint8)
+        region[:] = cv2.add(cv2.multiply(region, cv2.merge([rest] * 3), dtype=cv2.CV_32F), colour, dtype=cv2.CV_8U)
         return out[: image.shape[0], : image.shape[1]]
 
 

@@ -20,7 +20,10 @@ PIXEL_STRANGE = 2.0  # standard deviations, of a pixel
 BINS = (8, 32, 32)  # of brightness and two of colour, for telling a hand by its colours
 CHROMA = (48, 207)
 RARE = 2e-5  # share of a colour that is never seen
-FOREIGN = 1.2  # mean logarithm of the ratio of colours
+FOREIGN, STILL_FOREIGN = (
+    1.7,
+    1.0,
+)  # mean logarithm of the ratio of colours: of something new, and of what was in front before
 LEAST_PX = 30  # half-resolution px: smaller patches are no hand
 LEAST_INNER = 0.08  # share of the surface, of patches that do not reach its outline: mouths and eyes are none
 
@@ -50,11 +53,10 @@ def in_front(
     limit = np.where(was > 0, STILL_STRANGE, STRANGE) * factor
     agreement = (1.0 / (1.0 + (strange / STRANGE) ** 2)).astype(np.float32)
     core = ((strange > limit) & (view.inside > 0)).astype(np.uint8)
-    core = cv2.morphologyEx(core, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    core = reaching(core, view.inside)
+    core = reaching(cast(Mask, cv2.morphologyEx(core, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))), view.inside)
     if core.any():
         ratio = colour_ratio(view, core, last_shade)
-        core = foreign(core, ratio)
+        core = foreign(core, ratio, was)
         if core.any():
             core = outlined(core, view, last_shade, ratio)
     return core, agreement
@@ -64,7 +66,7 @@ def colour_ratio(view: View, core: Mask, shade: Floats) -> Floats:
     """How much more usual a pixel's colour is in the patches than on the surface, now or as predicted: logarithm (h, w)."""
     seen, expected = codes(view.seen), codes(view.predicted * shade[..., None])
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (WINDOW, WINDOW))
-    middle = cv2.erode(core, np.ones((5, 5), np.uint8))
+    middle = cast(Mask, cv2.erode(core, np.ones((5, 5), np.uint8)))
     away = ((view.inside > 0) & (cv2.dilate(core, disc) == 0)).astype(np.uint8)
     strangers = histogram(seen, middle if middle.any() else core)
     own = 0.5 * histogram(seen, away) + 0.5 * histogram(expected, view.inside.astype(np.uint8))
@@ -86,12 +88,13 @@ def histogram(picture: NDArray[np.uint8], where: Mask) -> Floats:
     return cast(Floats, smooth / max(float(counts.sum()), 1.0))
 
 
-def foreign(core: Mask, ratio: Floats) -> Mask:
+def foreign(core: Mask, ratio: Floats, was: Mask) -> Mask:
     """Those patches whose colours are not the surface's own: a mouth that opens is no hand."""
     count, label = cv2.connectedComponents(core, connectivity=8)
     area = np.maximum(np.bincount(label.ravel(), minlength=count), 1)
     own = np.bincount(label.ravel(), np.clip(ratio, -3, 3).ravel(), minlength=count) / area
-    kept = own > FOREIGN
+    known = np.bincount(label.ravel(), was.ravel(), minlength=count) / area
+    kept = own > np.where(known > 0.3, STILL_FOREIGN, FOREIGN)
     kept[0] = False
     return cast(Mask, kept[label].astype(np.uint8))
 
@@ -105,8 +108,8 @@ def outlined(core: Mask, view: View, shade: Floats, ratio: Floats) -> Mask:
     strange = np.sqrt(cv2.GaussianBlur(np.einsum("hwc,hwc->hw", off, off) / (3.0 * view.variance), (0, 0), 1.0))
     score = cv2.GaussianBlur(np.clip(ratio, -3, 3), (0, 0), 1.0) + np.clip(2 * (strange - PIXEL_STRANGE), -4, 0.5)
     found = ((maybe > 0) & (score > 0)).astype(np.uint8)
-    found = cv2.morphologyEx(found, cv2.MORPH_OPEN, small)
-    return cast(Mask, reaching(cv2.morphologyEx(found, cv2.MORPH_CLOSE, small), view.inside))
+    found = cast(Mask, cv2.morphologyEx(cv2.morphologyEx(found, cv2.MORPH_OPEN, small), cv2.MORPH_CLOSE, small))
+    return reaching(found, view.inside)
 
 
 def reaching(mask: Mask, inside: Floats) -> Mask:
