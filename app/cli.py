@@ -53,8 +53,16 @@ def parse() -> Run | Evaluate | Demo | Review | Export | Modes:
     except SystemExit as stop:
         if stop.code in (0, None):
             raise
-        words = re.sub(r"\x1b\[[0-9;]*m|[│╭╮╰╯─┌┐└┘]", " ", complaint.getvalue())
-        fail(" ".join(words.split()))
+        fail(in_one_line(complaint.getvalue()))
+
+
+def in_one_line(panel: str) -> str:
+    """What a panel of tyro's says, without frame, title, the parser's own names and the repeated help text."""
+    rows = [row.strip("│| ") for row in re.sub(r"\x1b\[[0-9;]*m", "", panel).splitlines() if row.strip()[:1] in ("│", "|")]
+    sections = [" ".join(part.split()) for part in re.split(r"[─-]{9,}", "\n".join(rows))]
+    what = re.sub(r"^Error parsing \S+: (?=--)", "", sections[0].split(" Got errors:")[0]).rstrip(".")
+    where = re.search(r"modeshape.* --help", sections[-1])
+    return f"{what}; see {where.group() if where else 'modeshape --help'}"
 
 
 def run(command: Run | Evaluate | Demo | Review | Export | Modes) -> int:

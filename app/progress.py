@@ -34,6 +34,7 @@ class Progress:
             TimeRemainingColumn(compact=True),
             console=stderr,
             transient=True,
+            disable=not stderr.is_terminal,  # a file gets the lines that stay, and no blank one at the end
         )
         self._task = self._bars.add_task(what, total=None, error="")
 
@@ -59,4 +60,4 @@ class Progress:
 
     def say(self, text: str) -> None:
         """A line that stays."""
-        stderr.print(text, style="dim", highlight=False)
+        stderr.print(text, style="dim", highlight=False, soft_wrap=True)

@@ -228,6 +228,8 @@ class Recording:
         except UsageError:
             if error is None:  # what ended the run matters more
                 raise
+        if isinstance(error, Exception) and not self._placed and self.path is not None:
+            self.path.unlink(missing_ok=True)  # failed before there was a shape: nothing to look at
 
     def _points(self, entity: str, points_px: NDArray[np.floating]) -> None:
         self._stream.log(entity, rr.Points2D.from_fields(positions=points_px.astype(np.float32)))

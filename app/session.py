@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import count
+from itertools import chain, count
 from pathlib import Path
 from time import perf_counter
 from typing import Literal, cast
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from app.config import Run, Words, as_words
+from app.errors import UsageError
 from app.mesh_file import rest_of_surface
 from app.progress import Progress
 from app.recording import Recording
@@ -90,7 +91,11 @@ class Session:
         config = self._config
         with threadpool_limits(1), Video(config.source, *config.frame_range) as video:
             frames = iter(video)
-            first = next(frames)
+            first, second = next(frames), next(frames, None)
+            if second is None:
+                raise UsageError(
+                    f"{config.source} gives only one frame: a shape shows in how it moves; give a video, or more --frames"
+                )
             self._start(first, video)
             path = config.output.out or free_name(RECORDINGS, config.source)
             with (
@@ -110,7 +115,7 @@ class Session:
                 started = perf_counter()
                 try:
                     self._progress.expect(video.frame_count)
-                    self._loop(first, frames)
+                    self._loop(first, chain([second], frames))
                 except KeyboardInterrupt:
                     self._interrupted = True
                 self._settle(self._reconstruction.finish())
