@@ -17,14 +17,17 @@ class Export:
     Formats:
       glb    animated mesh with texture for Blender and every glTF viewer: the modes are morph targets. y up, right-handed;
              the rest shape is 1 m long, its first place the origin; time 0 is the first frame
-      obj    a folder with frame_000123.obj for each frame, one material and texture; axes and unit: --axes
+      obj    a folder with frame_000123.obj for each frame, one material and texture; axes: --axes
       ply    the same as PLY
       csv    a folder: points.csv (seen, projected, in 3-D), frames.csv (pose and camera path), lambda.csv, mesh.csv
       npz    the arrays of `run --shapes-out`, and observed and projected points, times, camera path
       mp4    the video with mesh, points and reprojections drawn over it
       webm   the same, for browsers
-    In csv, npz and (unless --axes y-up) obj and ply, x points right, y down, z forward, as the camera sees; the unit is a
-    pixel of the first frame, in depth too: an uncalibrated camera has no metres.
+
+    Axes and units:
+      camera axes (csv, npz, obj, ply): x right, y down, z forward, as the camera sees
+      y-up axes (glb; obj and ply with --axes y-up): x right, y up, z towards the viewer
+      unit (all but glb): a pixel of the first frame, in depth too, since an uncalibrated camera has no metres
 
     Examples:
       modeshape export recordings/demo.rrd --format glb
@@ -39,7 +42,7 @@ class Export:
     out: Path | None = None
     """File, or folder for obj, ply and csv; without it beside the recording and named after it."""
     axes: Literal["camera", "y-up"] = "camera"
-    """Of obj and ply: the camera's (x right, y down, z forward), or x right, y up, z towards the viewer."""
+    """Of obj and ply."""
     overwrite: bool = False
     """Replace what an earlier export wrote."""
     json: bool = False

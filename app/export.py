@@ -139,12 +139,11 @@ def write_meshes(playback: Playback, folder: Path, command: Export, advance: Cal
 
 def write_video(playback: Playback, out: Path, advance: Callable[[], None]) -> None:
     """The pictures with mesh, points and reprojections drawn over them, at the video's pace."""
-    from app.overlay import overlaid, zoom
+    from app.overlay import enlarged, overlaid
     from app.video_out import VideoSink
 
-    width, height = (zoom(playback.size) * side for side in playback.size)
     fps, shown = steady(playback.times_s)
-    with VideoSink(out, (width, height), fps) as video:
+    with VideoSink(out, enlarged(playback.size), fps) as video:
         for i, image in overlaid(playback):
             for _ in range(int(shown[i])):
                 video.write(image)

@@ -27,13 +27,13 @@ def overlaid(playback: Playback) -> Iterator[tuple[int, Image]]:
     """Row and picture of every frame that has one.
 
     Drawn over it: the mesh where the model puts it, the points that are seen, predicted or lost in the viewer's colors
-    with the way they came, and lines from the points to their reprojections. Pictures are enlarged as `zoom` says.
+    with the way they came, and lines from the points to their reprojections. Pictures have the size that `enlarged` says.
 
     Raises:
         UsageError: the recording has no pictures, or no model.
     """
     edges = playback.mesh.edges
-    scale = zoom(playback.size)
+    size = enlarged(playback.size)
     last_seen = np.full((playback.W.shape[2], 2), np.nan)
     trail: deque[Array] = deque(maxlen=TRAIL_FRAMES)
     some = False
@@ -45,7 +45,7 @@ def overlaid(playback: Playback) -> Iterator[tuple[int, Image]]:
         if image is None:
             continue
         some = True
-        canvas = Canvas(image, scale)
+        canvas = Canvas(image, size)
         canvas.trails(list(trail), SEEN_RGB)
         missing = last_seen[~visible]
         words = [("seen", int(visible.sum()), SEEN_RGB)]
@@ -68,9 +68,11 @@ def overlaid(playback: Playback) -> Iterator[tuple[int, Image]]:
         raise UsageError(f"{playback.path} has no pictures: run again with --image jpeg")
 
 
-def zoom(size: tuple[int, int]) -> int:
-    """How many times larger than its frames (width, height) an overlay is."""
-    return max(1, int(np.ceil(SMALLEST_SIDE_PX / min(size))))
+def enlarged(size: tuple[int, int]) -> tuple[int, int]:
+    """Size (width, height) of the overlays of frames of some size; even, as video codecs want it."""
+    scale = max(1.0, np.ceil(2 * SMALLEST_SIDE_PX / min(size)) / 2)
+    width, height = (int(side * scale) // 2 * 2 for side in size)
+    return width, height
 
 
 class Canvas:
@@ -80,10 +82,10 @@ class Canvas:
         image: the picture.
     """
 
-    def __init__(self, image: Image, scale: int) -> None:
-        self._scale = scale
-        self._unit = max(1.0, min(image.shape[:2]) * scale / SMALLEST_SIDE_PX)  # of radii and text
-        self.image: Image = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)  # type: ignore[assignment]
+    def __init__(self, image: Image, size: tuple[int, int]) -> None:
+        self._scale = np.array(size) / image.shape[1::-1]
+        self._unit = max(1.0, min(size) / SMALLEST_SIDE_PX)  # of radii and text
+        self.image: Image = cv2.resize(image, size, interpolation=cv2.INTER_CUBIC)  # type: ignore[assignment]
 
     def lines(self, segments: Array, color: Color, opacity: float) -> None:
         """Lines (n, k, 2) through k points each; those with an unknown point are left out."""
@@ -131,8 +133,8 @@ class Canvas:
 
     def _fixed(self, places: Array) -> NDArray[np.int32]:
         """Places in the enlarged picture as OpenCV's fixed-point numbers; pixel centres are whole numbers in both."""
-        enlarged = (places + 0.5) * self._scale - 0.5
-        return np.asarray(np.round(np.clip(enlarged, -1e4, 1e5) * 2**SUBPIXEL_BITS), np.int32)
+        scaled = (places + 0.5) * self._scale - 0.5
+        return np.asarray(np.round(np.clip(scaled, -1e4, 1e5) * 2**SUBPIXEL_BITS), np.int32)
 
     def _strokes(self, mask: Image, segments: Array, value: int) -> None:
         known = segments[np.isfinite(segments).all(axis=(1, 2))]

@@ -1,6 +1,10 @@
 """Writing a video: frames go in, a file appears when it is complete."""
 
+import os
 import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -24,7 +28,7 @@ class VideoSink:
 
     Args:
         path: the file, .mp4 or .webm.
-        size: (width, height) px of the frames.
+        size: (width, height) px of the frames; of odd ones the last row or column is not written.
         fps: frames per second.
 
     Raises:
@@ -38,7 +42,8 @@ class VideoSink:
         self._size = size
         codec = CODECS[path.suffix.lower()]
         # Containers store a rate as a fraction: three digits are enough for it to be a short one.
-        self._writer = cv2.VideoWriter(str(self._part), cv2.VideoWriter.fourcc(*codec), round(fps, 3), size)
+        with quiet():
+            self._writer = cv2.VideoWriter(str(self._part), cv2.VideoWriter.fourcc(*codec), round(fps, 3), size)
         if not self._writer.isOpened():
             self._part.unlink(missing_ok=True)
             raise UsageError(f"cannot write {path}: this OpenCV has no {codec} encoder, or the folder is not writable")
@@ -73,6 +78,20 @@ class VideoSink:
         if full or not complete:
             reason = "the disk is full" if full else "the file does not open again"
             raise UsageError(f"cannot write {self.path}: {reason}; free some space or choose another place")
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Nothing on stderr meanwhile: OpenCV finds fault with the codec's tag in .webm files and then writes them well."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def check_video_format(path: Path) -> None:
