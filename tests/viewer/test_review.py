@@ -1,0 +1,75 @@
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.config import Review
+from app.progress import Progress
+from app.review import review
+from tests.synthetic_run import CORNERS_BGR, write_run
+from tests.viewer.conftest import Viewer
+
+pytestmark = pytest.mark.viewer
+
+SETTLE_S = 20.0
+FRAMES = 40
+
+
+def wait(until: Callable[[], bool]) -> None:
+    end = time.monotonic() + SETTLE_S
+    while not until() and time.monotonic() < end:
+        time.sleep(0.1)
+    assert until()
+
+
+def shot(viewer: Viewer, name: str, frame: int) -> NDArray[np.uint8]:
+    viewer.client.set_time("frame", sequence=frame, play_state="paused")
+    [view] = [view for view in viewer.client.get_state().views if view.name.startswith(name)]
+    viewer.client.take_screenshot(view.view_id)  # the first one may be of a half-loaded scene
+    picture, before = b"", b"-"
+    end = time.monotonic() + SETTLE_S
+    while picture != before and time.monotonic() < end:
+        time.sleep(0.2)
+        picture, before = viewer.client.take_screenshot(view.view_id), picture
+    decoded = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
+    assert decoded is not None
+    return np.asarray(decoded, np.uint8)
+
+
+def shown(viewer: Viewer, *recordings: Path) -> set[str]:
+    """Send recordings as the command does; names of the views that open."""
+    review(Review(*recordings, connect=viewer.address, json=True), Progress())
+    views = {"Mesh", "Video"}
+    wait(lambda: all(any(view.name.startswith(name) for view in viewer.client.get_state().views) for name in views))
+    wait(lambda: not viewer.client.get_state().loading)
+    return {view.name for view in viewer.client.get_state().views}
+
+
+def test_one_recording(mortal_viewer: Viewer, tmp_path: Path) -> None:
+    run = write_run(tmp_path / "one.rrd", frames=FRAMES)
+    names = shown(mortal_viewer, run.path)
+    assert {"Mesh", "Reprojection error, px", "Milliseconds per stage", "Events", "Configuration", "Summary"} <= names
+    early, late = shot(mortal_viewer, "Mesh", 0), shot(mortal_viewer, "Mesh", 30)
+    for picture in (early, late):
+        assert (picture.max(axis=2) > 120).mean() > 0.05  # the mesh is there
+    assert np.abs(early.astype(int) - late).max() > 60
+    assert [view.reports for view in mortal_viewer.client.get_state().views if view.reports] == []
+
+
+def test_two_recordings_side_by_side(mortal_viewer: Viewer, tmp_path: Path) -> None:
+    first = write_run(tmp_path / "first.rrd", frames=FRAMES)
+    second = write_run(tmp_path / "second.rrd", frames=FRAMES // 2)
+    names = shown(mortal_viewer, first.path, second.path)
+    assert {"Mesh: first", "Mesh: second", "Video: first", "Video: second", "Share of points seen"} <= names
+    for side in ("first", "second"):
+        mesh, video = shot(mortal_viewer, f"Mesh: {side}", 10), shot(mortal_viewer, f"Video: {side}", 10)
+        assert (mesh.max(axis=2) > 120).mean() > 0.05
+        assert (video.max(axis=2) > 120).mean() > 0.2  # and the picture
+        for color in CORNERS_BGR:
+            assert (np.abs(mesh.astype(int) - color).max(axis=2) < 12).any()
+            assert (np.abs(video.astype(int) - color).max(axis=2) < 12).any()
+    assert [view.reports for view in mortal_viewer.client.get_state().views if view.reports] == []
