@@ -17,7 +17,10 @@ Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
 
 FEWEST_POINTS = 4
-ROBUST_SIGMAS = 5.0  # deviations from the model beyond which a point counts less
+ROBUST_SIGMAS = 8.0  # deviations from the model beyond which a point counts less
+GROSS_SIGMAS = 20.0  # deviations from the common motion beyond which a point is no sound start
+REWEIGHTINGS = 5  # most rounds of robust weights: one for clean points, more while gross outliers still pull
+REWEIGHTED = 0.005  # share of the weights that must change for another round
 SURPRISE = 2.0  # times the usual energy of a new frame, above which other bends are tried
 BENT_GAIN = 0.95  # of the window's energy, below which another bend is believed
 TILT_GAIN = 0.7  # of the first frame's energy, below which another tilt is believed
@@ -50,7 +53,8 @@ class SlidingWindow:
     def advance(self, W: Array, visible: Visibility) -> ShapeEstimate:
         """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape."""
         self._frame += 1
-        self._data.append(self.model.statistics(W, visible.astype(np.float64)))
+        weights = self._first_weights(W, visible)
+        self._data.append(self.model.statistics(W, weights))
         # A new frame starts as the last one: at constant velocity a tilt would overshoot into the mirrored branch.
         window = self._first_state(W, visible) if self.state is None else join([self.state, self.state[-1:]])
         if len(window) > self._length:
@@ -59,8 +63,10 @@ class SlidingWindow:
         found = self._adjust(window)
         if self._energy.edges is not None and found.value[-1] > SURPRISE * self._usual:
             found = self._bent_otherwise(found)
-        weights = robust_weights(self.model.residuals(W, found.state), visible)
-        if not np.array_equal(weights, visible):
+        for _ in range(REWEIGHTINGS):
+            before, weights = weights, robust_weights(self.model.residuals(W, found.state), visible)
+            if np.abs(weights - before).sum() < REWEIGHTED * len(weights):
+                break
             self._data[-1] = self.model.statistics(W, weights)
             found = self._adjust(found.state)
         newest = float(found.value[-1])
@@ -77,6 +83,13 @@ class SlidingWindow:
 
     def _adjust(self, start: State) -> Solution:
         return minimise(self._energy, stack(self._data), start, self._before, Solver())
+
+    def _first_weights(self, W: Array, visible: Visibility) -> Array:
+        """Visibility (p,) without the points whose motion since the last frame is out of all proportion."""
+        if self.state is None or visible.sum() < FEWEST_POINTS:
+            return visible.astype(np.float64)
+        motion = self.model.residuals(W, self.state)
+        return robust_weights(motion - np.median(motion[:, visible], axis=1)[:, None], visible, GROSS_SIGMAS)
 
     def _bent_otherwise(self, found: Solution) -> Solution:
         """The best of a solution and those with the newest frame undeformed or bent back at the start.
@@ -116,11 +129,14 @@ def extrapolated(earlier: State, last: State) -> State:
     return State(turned, 2 * last.t - earlier.t, 2 * last.log_s - earlier.log_s, 2 * last.Lambda - earlier.Lambda)
 
 
-def robust_weights(residuals: Array, visible: Visibility) -> Array:
-    """Weights (p,) that let points far outside the spread of the residuals (2, p) px count little (Geman-McClure)."""
-    distance = np.linalg.norm(np.where(visible, residuals, 0.0), axis=0)
+def robust_weights(residuals: Array, visible: Visibility, sigmas: float = ROBUST_SIGMAS) -> Array:
+    """Weights (p,) that let points so many deviations of the residuals (2, p) px away count little (Geman-McClure).
+
+    Few deviations would also silence bends that the modes cannot follow.
+    """
     if visible.sum() < FEWEST_POINTS:
         return visible.astype(np.float64)
+    distance = np.linalg.norm(np.where(visible, residuals, 0.0), axis=0)
     sigma = np.median(distance[visible]) / 1.1774  # median of a Rayleigh distribution
-    excess = np.maximum(distance / max(ROBUST_SIGMAS * sigma, 1e-9), 1.0)
+    excess = np.maximum(distance / max(sigmas * sigma, 1e-9), 1.0)
     return np.where(visible, excess**-4.0, 0.0)
