@@ -26,12 +26,12 @@ def review(command: Review, progress: Progress) -> None:
     Raises:
         UsageError: a recording that cannot be read, a file that cannot be written, no viewer.
     """
-    for path in (command.csv, command.plot):
-        check_free(path, overwrite=command.overwrite)
     if command.plot:
         from app.plots import check_format  # Matplotlib takes its time, and is not always wanted
 
         check_format(command.plot)
+    for path in (command.csv, command.plot):
+        check_free(path, overwrite=command.overwrite)
     url = None
     if command.connect:
         from app.viewer import running_viewer

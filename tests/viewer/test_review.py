@@ -40,6 +40,15 @@ def shot(viewer: Viewer, name: str, frame: int) -> NDArray[np.uint8]:
     return np.asarray(decoded, np.uint8)
 
 
+def test_view_uses_the_viewer_that_runs(mortal_viewer: Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = write_run(tmp_path / "one.rrd")
+    monkeypatch.setattr("app.viewer.PORT", int(mortal_viewer.address.rsplit(":", 1)[1]))
+    review(Review(run.path, view=True, json=True), Progress())
+    wait(lambda: bool(mortal_viewer.client.get_state().recordings))
+    [recording] = mortal_viewer.client.get_state().recordings
+    assert [(line.start, line.end) for line in recording.timelines if line.name == "frame"] == [(0, 5)]
+
+
 def shown(viewer: Viewer, *recordings: Path) -> set[str]:
     """Send recordings as the command does; names of the views that open."""
     review(Review(*recordings, connect=viewer.address, json=True), Progress())
