@@ -44,11 +44,6 @@ class Artwork:
         self._begun_s = 0.0  # when the video began its present round
         self._rewind(self._video)
 
-    @property
-    def moves(self) -> bool:
-        """Whether it is a video."""
-        return self._video is not None
-
     def at(self, time_s: float) -> Image:
         """What is to be seen at a time, which never goes back: (h, w, 4) BGR, premultiplied, and alpha."""
         if self._video is None:
@@ -150,6 +145,16 @@ class Levels:
             known[a] = np.maximum(known[a], both)
         total = cv2.GaussianBlur(wanted * known, (0, 0), 4.0) / np.maximum(cv2.GaussianBlur(known, (0, 0), 4.0), 1e-3)
         return cast(Floats, np.clip(total - SHARPEN, 0.0, len(self._levels) - 1.0).astype(np.float32))
+
+
+def first_picture(path: Path) -> Image:
+    """A picture, or a video's first, as (h, w, 4) premultiplied.
+
+    Raises:
+        UsageError: it cannot be read.
+    """
+    with Artwork(path) as artwork:
+        return artwork.at(0.0)
 
 
 def read_picture(path: Path) -> Image:

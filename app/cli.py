@@ -12,6 +12,7 @@ import tyro
 
 from app.config import Demo, Evaluate, Review, Run
 from app.config_export import Export, Modes
+from app.config_retexture import Retexture
 from app.errors import UsageError
 
 Command = (
@@ -19,6 +20,7 @@ Command = (
     | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
     | Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Review, tyro.conf.subcommand("review")]
+    | Annotated[Retexture, tyro.conf.subcommand("retexture")]
     | Annotated[Export, tyro.conf.subcommand("export")]
     | Annotated[Modes, tyro.conf.subcommand("modes")]
 )
@@ -44,7 +46,7 @@ def main() -> NoReturn:
         sys.exit(INTERRUPTED)
 
 
-def parse() -> Run | Evaluate | Demo | Review | Export | Modes:
+def parse() -> Run | Evaluate | Demo | Review | Retexture | Export | Modes:
     """The command asked for; a mistake is told in one line instead of a panel."""
     complaint = io.StringIO()
     try:
@@ -65,7 +67,7 @@ def in_one_line(panel: str) -> str:
     return f"{what}; see {where.group() if where else 'modeshape --help'}"
 
 
-def run(command: Run | Evaluate | Demo | Review | Export | Modes) -> int:
+def run(command: Run | Evaluate | Demo | Review | Retexture | Export | Modes) -> int:
     """Carry out a command; returns the exit code."""
     from app.progress import Progress
     from app.summary import as_json, as_table
@@ -84,6 +86,10 @@ def run(command: Run | Evaluate | Demo | Review | Export | Modes) -> int:
         from app.demo_run import demo
 
         words, printed_as_json = demo(command), command.json
+    elif isinstance(command, Retexture):
+        from app.retexture import retexture
+
+        words, printed_as_json = retexture(command, Progress()), command.json
     elif isinstance(command, Export):
         from app.export import export
 

@@ -10,9 +10,11 @@ from scipy.sparse import csr_array
 
 from app import shading
 from app.artwork import Box, Levels
+from app.errors import UsageError
 from app.matte import in_front
 from app.raster import Rasteriser, SurfaceMap
 from reconstruction.mesh import Mesh
+from reconstruction.model import Model
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -42,12 +44,16 @@ class Compositor:
         mesh: the surface.
         perspective: whether the camera is.
         laid: where the picture lies.
+
+    Raises:
+        UsageError: that is not on the surface.
     """
 
     def __init__(
         self, first: Image, reference_px: Array, mesh: Mesh, *, perspective: bool, laid: Laid | None = None
     ) -> None:
         laid = laid or Laid()
+        self._size = first.shape[1::-1]
         first = even(first)
         h, w = first.shape[:2]
         self._opacity = laid.opacity
@@ -62,6 +68,13 @@ class Compositor:
         covered = np.zeros((h, w), np.uint8)
         if still is not None:
             covered[still.region] = still.cover == 1
+        x, y, wide, tall = self._place
+        if not covered[max(y, 0) : max(y + tall, 0), max(x, 0) : max(x + wide, 0)].any():
+            across, down = np.column_stack([reference_px.min(axis=0), reference_px.max(axis=0)]).round().astype(int)
+            raise UsageError(
+                f"--place {x} {y} {wide} {tall} is not on the surface, which is between {across[0]} and {across[1]} across "
+                f"and {down[0]} and {down[1]} down in the first frame"
+            )
         self._still, self._first = still, first
         self._white = shading.white_level(first, covered)
         self._levels: tuple[Image, Levels] | None = None
@@ -96,9 +109,9 @@ class Compositor:
         self._hidden[half] = hidden
         return self._blended(image, surface, picture, shade[..., None] * gains, hidden)
 
-    def painted_first(self, picture: Image) -> Image:
+    def first(self, picture: Image) -> Image:
         """The first frame with the picture on it, in its light."""
-        image = self._first[: self._first.shape[0], : self._first.shape[1]]
+        image = self._first[: self._size[1], : self._size[0]]
         if self._still is None:
             return image
         h, w = self._still.cover.shape
@@ -137,6 +150,16 @@ class Compositor:
         region = out[surface.region]
         region[:] = cv2.add(cv2.multiply(region, cv2.merge([rest] * 3), dtype=cv2.CV_32F), colour, dtype=cv2.CV_8U)
         return out[: image.shape[0], : image.shape[1]]
+
+
+def painted(first: Image, reference_px: Array, model: Model, picture: Image, laid: Laid) -> Image:
+    """The first frame with the picture on it.
+
+    Raises:
+        UsageError: it is not on the surface.
+    """
+    compositor = Compositor(first, reference_px, model.mesh, perspective=model.camera.perspective, laid=laid)
+    return compositor.first(picture)
 
 
 def even(image: Image) -> Image:

@@ -64,15 +64,8 @@ class Output:
 
 
 @dataclass(frozen=True)
-class Run:
-    """Reconstruct a video, frame by frame, and record it.
-
-    Examples:
-      modeshape run paper.mp4 --roi 195 95 325 265
-      modeshape run 0 --view                        # the first camera, live
-      modeshape run frames/img%04d.png --mask sheet.png --frames 10:200
-      modeshape run sheet.mp4 --focal 900 --shapes-out shapes.npz --json
-    """
+class Source:
+    """What is reconstructed from: the options that `run` and a live `retexture` share."""
 
     source: tyro.conf.Positional[str]
     """Video file, image pattern (img%04d.png), camera index or URL."""
@@ -88,10 +81,7 @@ class Run:
     """Where the rest shape comes from: the first frames (a turning object: rigid; a flat sheet: plane), or a mesh file."""
     camera: Literal["perspective", "orthographic"] = "perspective"
     """How the picture came about."""
-    ground_truth: Path | None = None
-    """True shapes (.npz with W_px, S_gt, gt_frames) to score against."""
     model: tyro.conf.OmitArgPrefixes[Model] = Model()
-    output: tyro.conf.OmitArgPrefixes[Output] = Output()
 
     def __post_init__(self) -> None:
         if self.points < 4:
@@ -101,6 +91,33 @@ class Run:
     def frame_range(self) -> tuple[int, int | None]:
         """First frame, and the one after the last or None."""
         return parse_range(self.frames)
+
+
+@dataclass(frozen=True)
+class Run(Source):
+    """Reconstruct a video, frame by frame, and record it.
+
+    Examples:
+      modeshape run paper.mp4 --roi 195 95 325 265
+      modeshape run 0 --view                        # the first camera, live
+      modeshape run frames/img%04d.png --mask sheet.png --frames 10:200
+      modeshape run sheet.mp4 --focal 900 --shapes-out shapes.npz --json
+      modeshape run sheet.mp4 --texture logo.png --place 250 160 90 60 --view
+    """
+
+    ground_truth: Path | None = None
+    """True shapes (.npz with W_px, S_gt, gt_frames) to score against."""
+    texture: Path | None = None
+    """Picture (or video: its first) painted on the mesh in recording and viewer; for a video of it: modeshape retexture."""
+    place: tuple[int, int, int, int] | None = None
+    """Where --texture lies in the first frame: X Y WIDTH HEIGHT in pixels; without it over the whole mesh."""
+    opacity: float = 1.0
+    """Of --texture, 0 to 1."""
+    output: tyro.conf.OmitArgPrefixes[Output] = Output()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_laid(self.place, self.opacity)
 
 
 @dataclass(frozen=True)
@@ -177,6 +194,18 @@ class Review:
     """Address (host:port) of a running viewer to show it in."""
     json: bool = False
     """Print the facts as JSON on stdout; of two recordings as a list in "recordings"."""
+
+
+def check_laid(place: tuple[int, int, int, int] | None, opacity: float) -> None:
+    """See to it that a picture can lie there.
+
+    Raises:
+        UsageError: it cannot.
+    """
+    if place is not None and (place[2] < 1 or place[3] < 1):
+        raise UsageError(f"--place {' '.join(map(str, place))} has no area: give X Y WIDTH HEIGHT, both sizes 1 and more")
+    if not 0 <= opacity <= 1:
+        raise UsageError(f"--opacity {opacity} is no opacity: give 0 to 1")
 
 
 def parse_range(text: str) -> tuple[int, int | None]:

@@ -1,8 +1,7 @@
 """The frame loop: read, track, reconstruct, record."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import chain, count
 from pathlib import Path
 from time import perf_counter
@@ -13,12 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from app.artwork import first_picture
+from app.compositing import Laid, painted
 from app.config import Run, Words, as_words
 from app.errors import UsageError
 from app.mesh_file import rest_of_surface
+from app.observer import Followed, Observer
 from app.progress import Progress
 from app.recording import Recording
 from app.results import Collected, check_free, save_shapes, score_words
+from app.stopwatch import Stopwatch
+from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.model import ShapeEstimate
 from reconstruction.online import Reconstruction, Settings
@@ -28,27 +32,7 @@ from tracking.region import region_mask
 from tracking.tracks import Tracks, Truth
 from tracking.video import Frame, Video
 
-STAGES = ("decode", "track", "reconstruct", "record")
 RECORDINGS = Path("recordings")
-
-
-@dataclass
-class Stopwatch:
-    """Milliseconds per stage: of the current frame, and summed."""
-
-    now: dict[str, float] = field(default_factory=dict)
-    total: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
-
-    @contextmanager
-    def time(self, stage: str) -> Iterator[None]:
-        """Add the duration of the body to a stage."""
-        started = perf_counter()
-        try:
-            yield
-        finally:
-            elapsed = (perf_counter() - started) * 1e3
-            self.now[stage] = self.now.get(stage, 0.0) + elapsed
-            self.total[stage] += elapsed
 
 
 class Session:
@@ -57,13 +41,16 @@ class Session:
     Args:
         config: what the person asked for.
         progress: where to report.
+        observer: who else wants to know; with one, a recording is written only if its name is given.
 
     Raises:
         UsageError, TrackingError: a file or option that cannot be used.
     """
 
-    def __init__(self, config: Run, progress: Progress) -> None:
-        self._config, self._progress = config, progress
+    def __init__(self, config: Run, progress: Progress, observer: Observer | None = None) -> None:
+        self._config, self._progress, self._observer = config, progress, observer
+        self._picture = first_picture(config.texture) if config.texture else None
+        self._followed = Followed(observer)
         output = config.output
         for path in (output.tracks_out, output.shapes_out):
             check_free(path, overwrite=output.overwrite)
@@ -97,7 +84,9 @@ class Session:
                     f"{config.source} gives only one frame: a shape shows in how it moves; give a video, or more --frames"
                 )
             self._start(first, video)
-            path = config.output.out or free_name(RECORDINGS, config.source)
+            path = config.output.out
+            if path is None and self._observer is None:
+                path = free_name(RECORDINGS, config.source)
             with (
                 Recording(
                     path,
@@ -118,7 +107,8 @@ class Session:
                     self._loop(first, chain([second], frames))
                 except KeyboardInterrupt:
                     self._interrupted = True
-                self._settle(self._reconstruction.finish())
+                self._finish()
+                self._followed.end()
                 self._elapsed_s = perf_counter() - started
                 summary = self._summary()
                 recording.summary(summary)
@@ -149,7 +139,7 @@ class Session:
             given, inside = rest_of_surface(Path(config.rest_shape), points_px, camera)
             points_px = points_px[inside]
             self._reconstruction = Reconstruction(camera, settings, given)
-        self._first_image, self._points_px = first.image, points_px
+        self._first, self._points_px, self._fps = first, points_px, video.fps
 
     def _loop(self, first: Frame, frames: Iterator[Frame]) -> None:
         tracker = PointTracker(first.image, self._points_px)
@@ -168,6 +158,7 @@ class Session:
         self._seen.append(float(observation.visible.mean()))
         if self._config.output.tracks_out:
             self._tracks.append(observation)
+        self._followed.add(frame, observation)
         phase = self._reconstruction.phase
         with self._watch.time("reconstruct"):
             estimates = self._reconstruction.update(observation.points_px.T, observation.visible)
@@ -188,6 +179,16 @@ class Session:
             del self._times[index]
             self._collected.add(index, estimate)
             self._recording.estimate(index, time_s, estimate)
+            self._followed.shape(index, estimate)
+
+    def _finish(self) -> None:
+        """Settle for what the bootstrap has; an interrupted one may have too little, and the run is kept all the same."""
+        try:
+            self._settle(self._reconstruction.finish())
+        except ReconstructionError as error:
+            if not self._interrupted:
+                raise
+            self._progress.say(str(error))
 
     def _record_model(self) -> None:
         """Everything about the model, and a word on how its rest shape was found."""
@@ -196,14 +197,20 @@ class Session:
         index = next(reversed(self._times))
         self._recording.event(index, self._times[index], rest.note)
         self._progress.say(rest.note)
+        first = self._first.image
+        if self._picture is not None:
+            laid = Laid(self._config.place, self._config.opacity)
+            first = painted(first, self._points_px, model, self._picture, laid)
         self._recording.rest(
             model.basis,
             model.mesh.faces,
             model.mesh.edges,
             model.camera,
-            texture_bgr=self._first_image,
+            texture_bgr=first,
             texture_px=self._points_px,
         )
+        if self._observer:
+            self._observer.begin(self._first, self._points_px, model, self._fps)
         self._modelled = True
 
     def _summary(self) -> Words:
@@ -227,7 +234,7 @@ class Session:
         if self._truth and rest:
             rest_points, mesh = rest.motion.shape, self._reconstruction.model.mesh
             words |= score_words(self._collected.score_against(self._truth, rest_points, mesh))
-        return words | {"recording": str(self._recording_path)}
+        return words | ({"recording": str(self._recording_path)} if self._recording_path else {})
 
     def _save(self) -> None:
         output = self._config.output

@@ -61,7 +61,9 @@ class Reference:
         """The part of a frame that a map (h, w, 2) with its cover (h, w) belongs to, both of even size."""
         inside = (halved(cover) == 1).astype(np.float32)
         places = (halved(uv) - np.float32(0.5)) * np.float32(0.5)
-        layers = cv2.remap(self._layers, places, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        layers = cast(
+            Floats, cv2.remap(self._layers, places, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+        )
         return View(halved(crop), layers[..., :3], layers[..., 3], inside)
 
 

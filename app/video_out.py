@@ -18,6 +18,7 @@ from app.errors import UsageError
 Image = NDArray[np.uint8]
 
 CODECS = {".mp4": "mp4v", ".webm": "VP80"}
+CHECKED_FRAMES = 30  # between two looks at the disk
 FULL_BYTES = 2**20  # so little left on a disk explains a failure
 
 
@@ -50,10 +51,16 @@ class VideoSink:
         self._frames = 0
 
     def write(self, image: Image) -> None:
-        """The next frame, (H, W, 3) BGR."""
+        """The next frame, (H, W, 3) BGR.
+
+        Raises:
+            UsageError: the disk is full.
+        """
         assert image.shape[1::-1] == self._size, "OpenCV would drop the frame without a word"
         self._writer.write(image)
         self._frames += 1
+        if self._frames % CHECKED_FRAMES == 0 and self._full():
+            raise self._failure("the disk is full")
 
     def __enter__(self) -> Self:
         return self
@@ -68,16 +75,54 @@ class VideoSink:
             self._part.unlink(missing_ok=True)
 
     def _check(self) -> None:
-        """OpenCV does not say when a disk is full: the file must open again, and have room left beside it."""
+        """OpenCV does not say when a disk is full: the file must open again, be complete, and have room beside it."""
         if self._frames == 0:
             raise UsageError(f"cannot write {self.path}: there is no frame to write")
-        full = shutil.disk_usage(self._part.parent).free < FULL_BYTES
+        if self._full():
+            raise self._failure("the disk is full")
         written = cv2.VideoCapture(str(self._part))
-        complete = written.isOpened() and written.read()[0]
+        announced = written.get(cv2.CAP_PROP_FRAME_COUNT)  # of .webm from its length in time, which comes last
+        complete = written.isOpened() and written.read()[0] and abs(announced - self._frames) <= 1 + 0.02 * self._frames
         written.release()
-        if full or not complete:
-            reason = "the disk is full" if full else "the file does not open again"
-            raise UsageError(f"cannot write {self.path}: {reason}; free some space or choose another place")
+        if not complete:
+            raise self._failure("the disk took only a part of it")
+
+    def _full(self) -> bool:
+        return shutil.disk_usage(self._part.parent).free < FULL_BYTES
+
+    def _failure(self, reason: str) -> UsageError:
+        return UsageError(f"cannot write {self.path}: {reason}; free some space or choose another place with --out")
+
+
+class PacedVideo:
+    """Frames with times of their own in a video of constant rate: each is shown until the next one's time.
+
+    Args:
+        sink: the video.
+        fps: its rate.
+    """
+
+    def __init__(self, sink: VideoSink, fps: float) -> None:
+        self._sink, self._fps = sink, fps
+        self._shown: Image | None = None
+        self._begun_s = 0.0
+        self._frames = 0
+
+    def write(self, image: Image, time_s: float) -> None:
+        """The frame (H, W, 3) of a time; frames too close to be shown are left out."""
+        if self._shown is None:
+            self._begun_s = time_s
+        self._fill(round((time_s - self._begun_s) * self._fps))
+        self._shown = image
+
+    def end(self) -> None:
+        """Show the last frame, too."""
+        self._fill(self._frames + 1)
+
+    def _fill(self, frames: int) -> None:
+        while self._shown is not None and self._frames < frames:
+            self._sink.write(self._shown)
+            self._frames += 1
 
 
 @contextmanager
