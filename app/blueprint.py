@@ -60,6 +60,7 @@ def blueprint() -> rrb.Blueprint:
                     ),
                     rrb.TimeSeriesView(name="Milliseconds per stage", origin=entities.TIMING),
                     rrb.TextLogView(name="Events", origin=entities.EVENTS),
+                    rrb.Spatial2DView(name="Modes", origin=entities.MODES, background=(255, 255, 255)),
                     rrb.TextDocumentView(name="Configuration", origin=entities.CONFIGURATION),
                     rrb.TextDocumentView(name="Summary", origin=entities.SUMMARY),
                 ),

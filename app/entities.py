@@ -17,6 +17,7 @@ Static:
   edges (2n) int64, strips int64 (see `wireframe`; −1 ends a strip), texture_px (2p) the vertices in the
   first frame, texture_origin (2) px of the crop in it, size (2) of the picture, perspective bool,
   focal_px, center_px (2).
+- `modes`: EncodedImage (JPEG), figure of the mode shapes; there when the run is complete.
 - `configuration`, `summary`: TextDocument for people; modeshape.Document with json and version for
   programs.
 
@@ -67,3 +68,4 @@ LEADING = "coefficients/leading"
 EVENTS = "events"
 CONFIGURATION = "configuration"
 SUMMARY = "summary"
+MODES = "modes"

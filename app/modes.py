@@ -88,8 +88,10 @@ def title(name: str, basis: ModalBasis, metric: str) -> str:
     return f"Mode shapes of {name}: {basis.rest.shape[1]} points, {metric} distances"
 
 
-def draw(basis: ModalBasis, mesh: Mesh, eigenvalues: Array, headline: str, *, columns: int) -> bytes:
-    """The figure as a PNG."""
+def draw(
+    basis: ModalBasis, mesh: Mesh, eigenvalues: Array, headline: str, *, columns: int = 5, jpeg: bool = False
+) -> bytes:
+    """The figure as a PNG or, smaller, as a JPEG."""
     from app.modes_figure import modes_figure
 
-    return modes_figure(basis, mesh, eigenvalues, title=headline, columns=columns)
+    return modes_figure(basis, mesh, eigenvalues, title=headline, columns=columns, jpeg=jpeg)

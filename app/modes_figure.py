@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 COLUMNS = 5
+DPI, SMALL_DPI = 150, 100
 PANEL_INCHES = 1.9
 LEFT, SPECTRUM, TOP, BOTTOM = 1.25, 4.1, 0.85, 0.4  # inches around the panels
 AMPLITUDE = 0.18  # largest displacement, as a share of the rest shape's length
@@ -56,16 +57,20 @@ class View:
 
 
 def modes_figure(
-    basis: ModalBasis, mesh: Mesh, spectrum: Array, *, title: str, columns: int = COLUMNS, dpi: int = 150
+    basis: ModalBasis, mesh: Mesh, spectrum: Array, *, title: str, columns: int = COLUMNS, jpeg: bool = False
 ) -> bytes:
-    """The leading modes under Γ_α, Γ_β, Γ_τ (rows) and the eigenvalues `spectrum` (n,), descending, n >= r, as a PNG."""
+    """The leading modes under Γ_α, Γ_β, Γ_τ (rows) and the eigenvalues `spectrum` (n,), descending, n >= r.
+
+    Returns:
+        a PNG, or a smaller picture as a JPEG.
+    """
     columns = min(columns, len(basis.eigenvalues))
     view = View.three_quarter()
     length = float(np.ptp(basis.Phi[:, 0] @ basis.rest))
     frame = limits(basis, view, length, columns)
     panel = PANEL_INCHES * np.array([np.ptp(frame[0]), np.ptp(frame[1])]) / np.sqrt(np.ptp(frame[0]) * np.ptp(frame[1]))
     width, height = panel * (columns, 3) + (LEFT + SPECTRUM, TOP + BOTTOM)
-    figure = Figure(figsize=(width, height), facecolor="white", dpi=dpi)
+    figure = Figure(figsize=(width, height), facecolor="white", dpi=SMALL_DPI if jpeg else DPI)
     FigureCanvasAgg(figure)
 
     def place(x: float, y: float, w: float, h: float) -> tuple[float, float, float, float]:
@@ -93,9 +98,9 @@ def modes_figure(
     figure.text(0.18 / width, 1 - 0.3 / height, title, fontsize=13, color=INK, va="center")
     key = "color: the mode's value at a point, from negative (blue) to positive (red); gray: rest shape"
     figure.text(0.18 / width, 0.2 / height, key, fontsize=8, color=FAINT, va="center")
-    png = BytesIO()
-    figure.savefig(png, format="png")
-    return png.getvalue()
+    picture = BytesIO()
+    figure.savefig(picture, format="jpg" if jpeg else "png", pil_kwargs={"quality": 90} if jpeg else None)
+    return picture.getvalue()
 
 
 def displaced(basis: ModalBasis, axis: int, mode: int, length: float) -> Array:

@@ -34,6 +34,8 @@ def overlaid(playback: Playback) -> Iterator[tuple[int, Image]]:
     """
     edges = playback.mesh.edges
     size = enlarged(playback.size)
+    a, b = playback.texture_px[edges].transpose(1, 0, 2)
+    apart = float(np.median(np.linalg.norm(a - b, axis=1))) * size[0] / playback.size[0]
     last_seen = np.full((playback.W.shape[2], 2), np.nan)
     trail: deque[Array] = deque(maxlen=TRAIL_FRAMES)
     some = False
@@ -45,7 +47,7 @@ def overlaid(playback: Playback) -> Iterator[tuple[int, Image]]:
         if image is None:
             continue
         some = True
-        canvas = Canvas(image, size)
+        canvas = Canvas(image, size, float(np.clip(0.16 * apart, 1.2, 2.2)))
         canvas.trails(list(trail), SEEN_RGB)
         missing = last_seen[~visible]
         words = [("seen", int(visible.sum()), SEEN_RGB)]
@@ -76,15 +78,16 @@ def enlarged(size: tuple[int, int]) -> tuple[int, int]:
 
 
 class Canvas:
-    """A picture (H, W, 3) BGR to draw on, enlarged; coordinates are pixels of the original.
+    """A picture (H, W, 3) BGR to draw on, enlarged to `size` with dots of radius `dot_px`; coordinates are the original's.
 
     Attributes:
         image: the picture.
     """
 
-    def __init__(self, image: Image, size: tuple[int, int]) -> None:
+    def __init__(self, image: Image, size: tuple[int, int], dot_px: float = 1.8) -> None:
         self._scale = np.array(size) / image.shape[1::-1]
-        self._unit = max(1.0, min(size) / SMALLEST_SIDE_PX)  # of radii and text
+        self._unit = max(1.0, min(size) / SMALLEST_SIDE_PX)  # of lines and text
+        self._dot_px = dot_px * self._unit
         self.image: Image = cv2.resize(image, size, interpolation=cv2.INTER_CUBIC)  # type: ignore[assignment]
 
     def lines(self, segments: Array, color: Color, opacity: float) -> None:
@@ -103,9 +106,9 @@ class Canvas:
 
     def points(self, places: Array, color: Color) -> None:
         """Dots at places (n, 2), with a dark rim so that they show on every ground."""
-        radius = 1.8 * self._unit
+        radius = self._dot_px
         fixed = self._fixed(places[np.isfinite(places).all(axis=1)])
-        for grown, paint in ((0.8 * self._unit, (28, 24, 20)), (0.0, color[::-1])):
+        for grown, paint in ((0.45 * self._dot_px, (28, 24, 20)), (0.0, color[::-1])):
             thick = round((radius + grown) * 2**SUBPIXEL_BITS)
             for x, y in fixed.tolist():
                 cv2.circle(self.image, (x, y), thick, paint, cv2.FILLED, cv2.LINE_AA, SUBPIXEL_BITS)

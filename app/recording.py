@@ -203,6 +203,11 @@ class Recording:
         self._stream.at(index, time_s)
         self._stream.log(entities.EVENTS, rr.TextLog(text, level=level))
 
+    def modes(self, figure: bytes) -> None:
+        """The figure of the mode shapes, a JPEG."""
+        if self._stream.open:
+            self._stream.log(entities.MODES, rr.EncodedImage(contents=figure, media_type="image/jpeg"), static=True)
+
     def summary(self, values: Mapping[str, object]) -> None:
         """What came out of the run."""
         self._document(entities.SUMMARY, "Summary", values)

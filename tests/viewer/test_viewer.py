@@ -56,6 +56,7 @@ def test_the_blueprint_opens_healthy(viewer: Viewer) -> None:
         "This frame": "BarChart",
         "Milliseconds per stage": "TimeSeries",
         "Events": "TextLog",
+        "Modes": "2D",
         "Configuration": "TextDocument",
         "Summary": "TextDocument",
     }
