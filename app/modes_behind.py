@@ -42,6 +42,7 @@ class ModesBehind:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C ends the run, which still wants the figure
         )
 
     def figure(self, timeout_s: float) -> bytes | None:

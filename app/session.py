@@ -17,6 +17,7 @@ from app.compositing import Laid, painted
 from app.config import Run, Words, as_words
 from app.errors import UsageError
 from app.mesh_file import rest_of_surface
+from app.modes_behind import ModesBehind
 from app.observer import Followed, Observer
 from app.progress import Progress
 from app.recording import Recording
@@ -33,6 +34,7 @@ from tracking.tracks import Tracks, Truth
 from tracking.video import Frame, Video
 
 RECORDINGS = Path("recordings")
+MODES_WAIT_S = 5.0  # a run of a few frames waits so long, at its end, for the figure of its modes
 
 
 class Session:
@@ -63,6 +65,7 @@ class Session:
         self._seen: list[float] = []
         self._tracks: list[Observation] = []
         self._recording_path: Path | None = None
+        self._modes: ModesBehind | None = None
         self._interrupted = self._modelled = False
         self._elapsed_s = 0.0
 
@@ -90,7 +93,7 @@ class Session:
             with (
                 Recording(
                     path,
-                    configuration=as_words(config) | {"focal_px": self._reconstruction.camera.focal_px},
+                    configuration=as_words(config) | {"focal_px": self._focal_px},
                     size=video.size,
                     connect=config.output.connect,
                     view=config.output.view,
@@ -112,6 +115,8 @@ class Session:
                 self._elapsed_s = perf_counter() - started
                 summary = self._summary()
                 recording.summary(summary)
+                if self._modes and (figure := self._modes.figure(MODES_WAIT_S)):
+                    recording.modes(figure)
         self._save()
         return summary
 
@@ -165,7 +170,7 @@ class Session:
         with self._watch.time("record"):
             self._recording.observe(frame, observation, phase=phase.value)
             self._settle(estimates)
-            self._recording.timing(frame.index, frame.time_s, self._watch.now)
+        self._recording.timing(frame.index, frame.time_s, self._watch.now)
         self._watch.now.clear()
         self._frames += 1
         self._progress.advance(self._reconstruction.phase.value, self._collected.last_rms_px)
@@ -211,7 +216,16 @@ class Session:
         )
         if self._observer:
             self._observer.begin(self._first, self._points_px, model, self._fps)
+        if self._recording_path:
+            metric = self._config.model.metric
+            self._modes = ModesBehind(model.basis, model.mesh, metric, self._recording_path.stem)
         self._modelled = True
+
+    @property
+    def _focal_px(self) -> float | None:
+        """The focal length in force; None for an orthographic camera."""
+        camera = self._reconstruction.camera
+        return camera.focal_px if camera.perspective else None
 
     def _summary(self) -> Words:
         config, rest, frames = self._config, self._reconstruction.rest, max(self._frames, 1)
@@ -224,7 +238,7 @@ class Session:
             "rest_shape_note": rest.note if rest else None,
             "bootstrap_frames": self._reconstruction.bootstrap_frames,
             "deformation": self._reconstruction.deformation,
-            "focal_px": self._reconstruction.camera.focal_px,
+            "focal_px": self._focal_px,
             "visible_share": float(np.mean(self._seen)) if self._seen else None,
             "visible_share_last": self._seen[-1] if self._seen else None,
             "reprojection_rms_px": self._collected.reprojection_rms_px,
