@@ -16,6 +16,7 @@ from app.artwork import first_picture
 from app.compositing import Laid, painted
 from app.config import Run, Words, as_words
 from app.errors import UsageError
+from app.interrupts import completed
 from app.mesh_file import rest_of_surface
 from app.modes_behind import ModesBehind
 from app.observer import Followed, Observer
@@ -147,14 +148,16 @@ class Session:
         self._first, self._points_px, self._fps = first, points_px, video.fps
 
     def _loop(self, first: Frame, frames: Iterator[Frame]) -> None:
-        tracker = PointTracker(first.image, self._points_px)
+        with self._watch.time("track"):
+            tracker = PointTracker(first.image, self._points_px)
         observation = Observation(self._points_px, np.ones(len(self._points_px), bool))
         frame: Frame | None = first
         while frame is not None:
-            if self._frames:
-                with self._watch.time("track"):
-                    observation = tracker.track(frame.image, self._reconstruction.predict())
-            self._step(frame, observation)
+            with completed():
+                if self._frames:
+                    with self._watch.time("track"):
+                        observation = tracker.track(frame.image, self._reconstruction.predict())
+                self._step(frame, observation)
             with self._watch.time("decode"):
                 frame = next(frames, None)
 
@@ -189,11 +192,15 @@ class Session:
     def _finish(self) -> None:
         """Settle for what the bootstrap has; an interrupted one may have too little, and the run is kept all the same."""
         try:
-            self._settle(self._reconstruction.finish())
+            with self._watch.time("reconstruct"):
+                estimates = self._reconstruction.finish()
         except ReconstructionError as error:
             if not self._interrupted:
                 raise
             self._progress.say(str(error))
+            return
+        with self._watch.time("record"):
+            self._settle(estimates)
 
     def _record_model(self) -> None:
         """Everything about the model, and a word on how its rest shape was found."""
