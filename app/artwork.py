@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import UsageError
+from app.shading import sampled
 from tracking import TrackingError
 from tracking.video import Frame, Video
 
@@ -20,7 +21,6 @@ STILLS = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff"))
 FINEST = 2.0  # texels kept per pixel of the first frame: enough for a surface that comes twice as near
 SHARPEN = 0.3  # levels: bilinear sampling bears this much minification
 STEP_PX = 4  # between the pixels whose minification is looked at
-CLEAR = (0, 0, 0, 0)
 
 
 class Artwork:
@@ -130,7 +130,7 @@ class Levels:
         x, y, wide, tall = self._place
         scale = np.array((w / wide, h / tall))
         places = cv2.transform(uv, np.column_stack([np.diag(scale), (0.5 - np.array((x, y))) * scale - 0.5]))
-        return cast(Image, cv2.remap(picture, places, np.empty(0), cv2.INTER_LINEAR, borderValue=CLEAR))
+        return sampled(picture, cast(Floats, places), cv2.BORDER_CONSTANT)
 
     def _level(self, uv: Floats, cover: Floats) -> Floats:
         """The level wanted, on a coarse grid: smooth, so that no step between levels is seen."""

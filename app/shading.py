@@ -6,7 +6,7 @@ them, applied to displayed values, is the same change of light.
 """
 
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, TypeVar, cast
 
 import cv2
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float32]
 Image = NDArray[np.uint8]
+Pixels = TypeVar("Pixels", NDArray[np.uint8], NDArray[np.float32])
 
 NOISE = 5.0  # grey levels, of the camera and its compression
 MISPLACED = 0.3  # half-resolution px: how far the map may be off
@@ -61,10 +62,14 @@ class Reference:
         """The part of a frame that a map (h, w, 2) with its cover (h, w) belongs to, both of even size."""
         inside = (halved(cover) == 1).astype(np.float32)
         places = (halved(uv) - np.float32(0.5)) * np.float32(0.5)
-        layers = cast(
-            Floats, cv2.remap(self._layers, places, np.empty(0), cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        )
+        layers = sampled(self._layers, places, cv2.BORDER_REPLICATE)
         return View(halved(crop), layers[..., :3], layers[..., 3], inside)
+
+
+def sampled(picture: Pixels, places: Floats, border: int) -> Pixels:
+    """A picture (H, W, c) at places (h, w, 2) px between its pixels."""
+    one_map_for_both: Any = None
+    return cast(Pixels, cv2.remap(picture, places, one_map_for_both, cv2.INTER_LINEAR, borderMode=border))
 
 
 def halved(picture: NDArray[np.uint8] | Floats) -> Floats:
