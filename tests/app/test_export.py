@@ -303,6 +303,30 @@ def test_the_command_line(tmp_path: Path, run: Run) -> None:
     assert (tmp_path / "sheet.glb").is_file()
 
 
+def test_a_real_run_agrees_with_its_own_shapes(tmp_path: Path, shared_data: Path) -> None:
+    recording, shapes = tmp_path / "paper.rrd", tmp_path / "shapes.npz"
+    roi = ("--roi", "195", "95", "325", "265", "--frames", "0:30", "--points", "200")
+    done = modeshape("run", shared_data / "kinect_paper.mp4", *roi, "--out", recording, "--shapes-out", shapes)
+    assert done.returncode == 0, done.stderr
+    with np.load(shapes) as stored:
+        truth = dict(stored)
+    with np.load(words_out(recording, "npz")) as stored:
+        assert set(truth) <= set(stored)
+        for key, values in truth.items():
+            assert stored[key] == pytest.approx(values, rel=1e-4, abs=1e-6), key
+    glb = GlbFile(words_out(recording, "glb"))
+    sequence = sorted(words_out(recording, "ply").glob("frame_*.ply"))
+    for time_s, path, S in zip(glb.times_s, sequence, truth["S"], strict=True):
+        assert relative(glb.vertices(time_s), S.T) < 1e-4
+        assert relative(np.asarray(trimesh.load_mesh(path, process=False).vertices), S.T) < 1e-4
+    assert issues(words_out(recording, "glb", overwrite=True)) == []
+
+
+def words_out(recording: Path, kind: str, **options: object) -> Path:
+    words = export(Export(recording, format=kind, **options), Progress())  # type: ignore[arg-type]
+    return Path(str(words["out"]))
+
+
 @pytest.mark.parametrize(
     ("words", "complaint"),
     [
