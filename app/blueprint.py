@@ -21,7 +21,7 @@ def blueprint() -> rrb.Blueprint:
                 line_grid=False,
                 eye_controls=rrb.EyeControls3D(
                     kind=rrb.Eye3DKind.Orbital,
-                    position=(0.7, -0.5, -3.4),
+                    position=(0.9, -0.65, -4.2),
                     look_target=(0.0, 0.0, 0.0),
                     eye_up=(0.0, -1.0, 0.0),
                 ),

@@ -21,6 +21,7 @@ TURN_DEGREES = 10.0  # less turn than this and depth drowns in noise
 RELIEF_OVER_NOISE = 3.0  # third over fourth singular value of the observations
 HALVES_AGREE = 0.10  # relative difference of the shapes of even and odd frames
 JUDGING_POINTS = 150  # well-spread points are enough to decide on
+FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
 TILT_DEGREES = 25.0  # tilts a flat sheet is started from
 TILT_GAIN = 0.7  # a tilt is believed when it lowers the reprojection error below this share of the frontal one's
 STILL_PX = 0.5  # apparent motion, beyond that of a similarity, that is not noise
@@ -34,13 +35,17 @@ class RestShape:
         kind: where it came from.
         motion: shape (3, p), and poses of the bootstrap frames; one frame or more.
         note: the evidence in words, for the log.
-        flat: whether the shape has no relief.
     """
 
     kind: Kind
     motion: RigidMotion
     note: str
-    flat: bool
+
+    @property
+    def flat(self) -> bool:
+        """Whether the shape is a sheet: hardly any relief for its size."""
+        extent = np.linalg.svd(self.motion.shape, compute_uv=False)
+        return bool(extent[2] < FLAT_RELIEF * extent[0])
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,7 @@ def rigid(W: Array, visible: Visibility, camera: Camera) -> RestShape:
     motion = motion.in_first_frame()
     turn = view_turn_degrees(motion.R)
     note = f"rigid shape from {len(W)} frames, turned {turn:.0f}°, reprojection error {rms:.2f} px"
-    return RestShape("rigid", motion, note, flat=False)
+    return RestShape("rigid", motion, note)
 
 
 def factorize_often_seen(W: Array, visible: Visibility) -> RigidMotion:
@@ -142,7 +147,7 @@ def plane(W: Array, visible: Visibility, camera: Camera) -> RestShape:
     frontal = sheet(first, np.eye(3), camera)
     chosen = judging_points(W, visible)
     if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL_PX or len(W) < 3:
-        return RestShape("plane", frontal, "flat sheet facing the camera: the first frames show no turn", flat=True)
+        return RestShape("plane", frontal, "flat sheet facing the camera: the first frames show no turn")
     frames = np.unique(np.linspace(0, len(W) - 1, 16).astype(int))
     W_few, visible_few = W[frames][:, :, chosen], visible[frames][:, chosen]
     found = []
@@ -160,19 +165,18 @@ def plane(W: Array, visible: Visibility, camera: Camera) -> RestShape:
     turn = view_turn_degrees(tilted[0].R)
     if tilted[1] > TILT_GAIN * level[1] or turn < TURN_DEGREES:
         note = f"flat sheet facing the camera: its tilt does not show in {len(W)} frames"
-        return RestShape("plane", frontal, note, flat=True)
+        return RestShape("plane", frontal, note)
     whole = sheet(first, tilted[0].R[0], camera)
     tilt = np.rad2deg(np.arccos(np.clip(abs(whole.R[0, 2, 2]), 0, 1)))
     note = f"flat sheet tilted {tilt:.0f}° in the first frame, turned {turn:.0f}°, reprojection error {tilted[1]:.2f} px"
-    return RestShape("plane", whole.in_first_frame(), note, flat=True)
+    return RestShape("plane", whole.in_first_frame(), note)
 
 
 def given(shape: Array, kind: Kind, note: str) -> RestShape:
     """A rest shape (3, p) from elsewhere: a mesh file, or the first true shape."""
     shape = shape - shape.mean(axis=1, keepdims=True)
-    depths = np.linalg.svd(shape, compute_uv=False)
     motion = RigidMotion(shape, np.eye(3)[None], np.ones(1), np.zeros((1, 2)))
-    return RestShape(kind, motion, note, flat=bool(depths[2] < 1e-3 * depths[0]))
+    return RestShape(kind, motion, note)
 
 
 def sheet(image: Array, R: Array, camera: Camera) -> RigidMotion:

@@ -5,7 +5,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from reconstruction.camera import CONJUGATE, quaternion_exp, quaternion_from_rotation, quaternion_product
+from reconstruction.camera import (
+    CONJUGATE,
+    quaternion_exp,
+    quaternion_from_rotation,
+    quaternion_product,
+    rotation_from_quaternion,
+)
 from reconstruction.energy import Energy, State, join
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.rest_shape import tilt_axes
@@ -24,7 +30,9 @@ REWEIGHTED = 0.005  # share of the weights that must change for another round
 SURPRISE = 2.0  # times the usual energy of a new frame, above which other bends are tried
 BENT_GAIN = 0.95  # of the window's energy, below which another bend is believed
 TILT_GAIN = 0.7  # of the first frame's energy, below which another tilt is believed
-FIRST_TILT = 0.3  # radians the first frame is tilted by: a frontal flat sheet is a saddle that the solver never leaves
+FIRST_TILT = 0.3  # radians by which the first frame is tilted to look for a better pose
+FACING = 0.05  # radians within which a shape's main plane faces the camera
+LEAN = 0.1  # radians by which it is leant then
 OTHER_BENDS = (np.zeros((3, 1)), np.array([[1.0], [1.0], [-1.0]]))  # factors on the rows of Λ: undeformed, bent back
 
 
@@ -55,8 +63,7 @@ class SlidingWindow:
         self._frame += 1
         weights = self._first_weights(W, visible)
         self._data.append(self.model.statistics(W, weights))
-        # A new frame starts as the last one: at constant velocity a tilt would overshoot into the mirrored branch.
-        window = self._first_state(W, visible) if self.state is None else join([self.state, self.state[-1:]])
+        window = self._first_state(W, visible) if self.state is None else join([self.state, self._leant(self.state[-1:])])
         if len(window) > self._length:
             self._before, window = window[:1], window[1:]
             self._data.pop(0)
@@ -90,6 +97,17 @@ class SlidingWindow:
             return visible.astype(np.float64)
         motion = self.model.residuals(W, self.state)
         return robust_weights(motion - np.median(motion[:, visible], axis=1)[:, None], visible, GROSS_SIGMAS)
+
+    def _leant(self, last: State) -> State:
+        """Where a new frame starts: as the last one, but never facing an orthographic camera exactly.
+
+        There the image's derivative by tilt and by bending is zero: a saddle that the solver never leaves. (At constant
+        velocity a tilt would overshoot into the mirrored branch.)
+        """
+        facing = abs(float(rotation_from_quaternion(last.q)[0, 2, 2]))
+        if self.model.camera.perspective or facing < np.cos(FACING):
+            return last
+        return replace(last, q=quaternion_product(quaternion_exp(np.array([[LEAN, 0.0, 0.0]])), last.q))
 
     def _bent_otherwise(self, found: Solution) -> Solution:
         """The best of a solution and those with the newest frame undeformed or bent back at the start.

@@ -1,0 +1,38 @@
+"""Fixtures of the command line's tests."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.app.terminal import Command, in_process, still, turning, write_video
+from tests.tracking.scene import SIZE
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """The empty folder that commands run in."""
+    folder = tmp_path / "here"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+@pytest.fixture
+def modeshape(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, here: Path) -> Command:
+    """`modeshape ARGUMENTS…`, as if typed in that folder."""
+    assert Path.cwd() == here
+    return in_process(capfd, monkeypatch)
+
+
+@pytest.fixture(scope="session")
+def videos(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of short videos: a sheet that turns, one that does not move, one frame, nothing but black."""
+    folder = tmp_path_factory.mktemp("videos")
+    write_video(folder / "turning.mp4", turning(40))
+    write_video(folder / "still.mp4", still(70))
+    write_video(folder / "one.mp4", still(1))
+    write_video(folder / "black.mp4", [np.zeros((*SIZE[::-1], 3), np.uint8)] * 20)
+    (folder / "text.mp4").write_text("This is not a video.\n" * 50)
+    (folder / "empty.mp4").touch()
+    return folder
