@@ -1,0 +1,106 @@
+"""The figures the program promises, on real sequences with ground truth and on its own sample."""
+
+import itertools
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.app.terminal import Command
+from tests.synthetic_run import verify
+
+FLAG = ("flag250.npz", "--rest-shape", "first-truth", "--metric", "euclidean", "--modes", 20, "--deformation", "bending")
+FACE = ("face37.npz", "--rest-shape", "rigid", "--bootstrap-frames", 10, "--modes", 30, "--deformation", "general")
+KINECT = ("--roi", 195, 95, 325, 265, "--frames", "0:113")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "bound", "static"),
+    [
+        (FLAG, 0.036, 0.065),
+        ((*FLAG, "--missing", 0.4, "--seed", 0), 0.042, 0.065),
+        ((*FLAG, "--noise", 0.01, "--seed", 0), 0.045, 0.065),
+        (("flag250.npz", "--rest-shape", "rigid", "--bootstrap-frames", 15, *FLAG[5:]), 0.045, None),
+        (FACE, 0.033, 0.064),
+        (
+            ("flag250_perspective.npz", "--rest-shape", "first-truth", "--modes", 20, "--deformation", "inextensible"),
+            0.028,
+            0.065,
+        ),
+    ],
+    ids=["flag", "flag-missing", "flag-noise", "flag-rigid", "face", "flag-perspective"],
+)
+def test_evaluate(modeshape: Command, shared_data: Path, arguments: tuple[object, ...], bound: float, static) -> None:  # type: ignore[no-untyped-def]
+    file, *options = arguments
+    outcome = modeshape("evaluate", shared_data / str(file), *options, "--json")
+    assert outcome.code == 0, outcome.err
+    words = json.loads(outcome.out)
+    assert words["e3d"] <= bound
+    assert words["e3d"] <= words["e3d_camera"] < 3 * bound
+    if static is not None:
+        assert words["e3d_static"] == pytest.approx(static, abs=0.001)
+
+
+def test_more_modes_explain_more(modeshape: Command, shared_data: Path) -> None:
+    errors = []
+    for modes in (5, 10, 20, 30):
+        outcome = modeshape("evaluate", shared_data / "face37.npz", *FACE[1:5], "--modes", modes, *FACE[7:], "--json")
+        errors.append(json.loads(outcome.out)["e3d"])
+    assert errors[-1] < 0.75 * errors[0]
+    assert all(b < a + 0.001 for a, b in itertools.pairwise(errors))
+
+
+@pytest.mark.parametrize(("focal", "bound"), [((), 0.055), (("--focal", 528), 0.045)], ids=["width", "true"])
+def test_a_printed_sheet_is_followed(
+    modeshape: Command, shared_data: Path, here: Path, focal: tuple[object, ...], bound: float
+) -> None:
+    outcome = modeshape(
+        "run", shared_data / "kinect_paper.mp4", *KINECT, *focal, "--json", "--out", "paper.rrd",
+        "--ground-truth", shared_data / "kinect_paper_gt.npz", "--tracks-out", "tracks.npz",
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    words = json.loads(outcome.out)
+    assert words["frames"] == 113
+    assert words["points"] >= 400
+    with np.load("tracks.npz") as tracks:
+        assert tracks["visible"][112].mean() >= 0.6
+    assert words["reprojection_rms_px"] <= 2
+    assert words["e3d"] <= bound
+    assert words["e3d_static"] == pytest.approx(0.11, abs=0.015)
+    assert words["truth_points"] >= 250
+    assert words["truth_frames"] == 14
+    verify(here / "paper.rrd")
+
+
+def test_a_talking_face_is_followed(modeshape: Command, shared_data: Path, here: Path) -> None:
+    outcome = modeshape(
+        "run", shared_data / "talking_face.mp4", "--roi", 115, 70, 130, 160, "--frames", "0:600", "--json",
+        "--out", "face.rrd", "--shapes-out", "shapes.npz",
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    words = json.loads(outcome.out)
+    assert words["frames"] == 600
+    assert words["visible_share"] > 0.8
+    assert words["reprojection_rms_px"] < 3
+    with np.load("shapes.npz") as shapes:
+        image = shapes["K"] @ shapes["S"]
+    image = image[:, :2] / image[:, 2:]
+    centre, size = image.mean(axis=2), image.std(axis=2)
+    # In these 600 frames the head stays within half its size of where it was.
+    assert np.abs(centre - centre[0]).max() < 40
+    assert (size / size[0]).min() > 0.7
+    assert (size / size[0]).max() < 1.3
+    verify(here / "face.rrd")
+
+
+def test_demo(modeshape: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, here: Path) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    outcome = modeshape("demo", "--json")
+    assert outcome.code == 0, outcome.err
+    words = json.loads(outcome.out)
+    assert words["frames"] >= 240
+    assert words["e3d"] <= 0.05
+    assert words["e3d"] <= 0.5 * words["e3d_static"]
+    assert words["recording"] == "recordings/demo.rrd"
+    verify(here / "recordings" / "demo.rrd")
