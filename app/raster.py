@@ -17,7 +17,7 @@ Flags = NDArray[np.bool_]
 Places = NDArray[np.complex64]  # u + iv: NumPy moves one complex number faster than two real ones
 
 MARGIN_PX = 2
-SPAN_PX = 16  # longer spans are divided
+SPAN_PX = 8  # longer spans are divided
 NEIGHBOURS = np.ones((3, 3), np.uint8)
 
 
