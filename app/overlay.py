@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.errors import UsageError
 from app.playback import Playback
-from app.scenery import LOST_RGB, PREDICTED_RGB, SEEN_RGB, WIREFRAME_RGBA
+from app.scenery import LOST_RGB, PREDICTED_RGB, SEEN_RGB
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -17,6 +17,7 @@ Color = tuple[int, int, int]
 
 TRAIL_FRAMES = 8
 ERROR_RGB = (255, 255, 255)
+MESH_RGB = (30, 120, 255)  # deeper than in the viewer: it has to show on white paper, too
 MESH_OPACITY, TRAIL_OPACITY = 0.55, 0.8
 SMALLEST_SIDE_PX = 720  # smaller pictures are enlarged: thin lines need room
 SUBPIXEL_BITS = 4
@@ -47,13 +48,13 @@ def overlaid(playback: Playback) -> Iterator[tuple[int, Image]]:
         if image is None:
             continue
         some = True
-        canvas = Canvas(image, size, float(np.clip(0.16 * apart, 1.2, 2.2)))
+        canvas = Canvas(image, size, float(np.clip(0.14 * apart, 1.2, 2.0)))
         canvas.trails(list(trail), SEEN_RGB)
         missing = last_seen[~visible]
         words = [("seen", int(visible.sum()), SEEN_RGB)]
         if estimate is not None:
             projected = estimate.projection_px
-            canvas.lines(projected[edges], WIREFRAME_RGBA[:3], MESH_OPACITY)
+            canvas.lines(projected[edges], MESH_RGB, MESH_OPACITY)
             canvas.lines(np.stack([observed, projected], axis=1)[visible], ERROR_RGB, 0.9)
             canvas.points(projected[~visible], PREDICTED_RGB)
             words.append(("predicted", int((~visible).sum()), PREDICTED_RGB))
