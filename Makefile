@@ -2,13 +2,21 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: demo test lint types clean
+# The other OpenCV that people have; constraints.txt pins the newest.
+OPENCV4 := 4.14.0.94
+BIN4 := .venv-opencv4/bin
+
+.PHONY: demo test test-opencv4 lint types clean
 
 demo: .venv/ready
 	$(BIN)/modeshape demo
 
 test: .venv/ready
 	$(BIN)/python -m pytest
+
+test-opencv4: .venv-opencv4/ready
+	$(BIN4)/python -c 'import cv2; assert cv2.__version__.startswith("4."), cv2.__version__'
+	$(BIN4)/python -m pytest tests/tracking tests/app/test_session.py tests/app/test_cli.py tests/app/test_errors.py
 
 lint: .venv/ready
 	$(BIN)/ruff check .
@@ -17,10 +25,18 @@ lint: .venv/ready
 types: .venv/ready
 	$(BIN)/mypy
 
+# By the environment, since pip then pins what builds the package, too.
 .venv/ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	touch $@
+
+.venv-opencv4/ready: pyproject.toml constraints.txt
+	$(PYTHON) -m venv .venv-opencv4
+	sed 's/^\(opencv-contrib-python-headless\)==.*/\1==$(OPENCV4)/' constraints.txt > .venv-opencv4/constraints.txt
+	PIP_CONSTRAINT=.venv-opencv4/constraints.txt \
+	    $(BIN4)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	touch $@
 
 clean:
-	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-opencv4 .pytest_cache .mypy_cache .ruff_cache .hypothesis
