@@ -103,7 +103,7 @@ class Energy:
         edges: coarse edges of the inextensibility term.
     """
 
-    rotation: float = 1e-3
+    rotation: float = 3e-4
     translation: float = 0.0
     scale: float = 1e-3
     deformation: float = 1e-2

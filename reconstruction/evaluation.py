@@ -96,8 +96,10 @@ def followed(
 
 def with_noise(W: Array, level: float, rng: np.random.Generator) -> Array:
     """Observations (F, 2, p) with Gaussian noise of `level` times the largest distance to the centroid (paper §6)."""
-    centred = W - np.nanmean(W, axis=2, keepdims=True)
-    sigma = level * float(np.nanmax(np.linalg.norm(centred, axis=1)))
+    seen = np.isfinite(W)
+    centroid = W.sum(axis=2, where=seen, keepdims=True) / np.maximum(seen.sum(axis=2, keepdims=True), 1)
+    distance = np.linalg.norm(W - centroid, axis=1)
+    sigma = level * float(distance.max(initial=0.0, where=seen.all(axis=1)))
     return np.asarray(W + rng.normal(0.0, sigma, W.shape))
 
 

@@ -209,19 +209,37 @@ def test_a_file_is_not_replaced_silently(run: Run, tmp_path: Path) -> None:
     assert path.stat().st_size < run.path.stat().st_size
 
 
+def fail(path: Path, error: type[BaseException], run: Run | None = None) -> None:
+    """A run that ends in an error after its first frame, whose shape is known if it is that of `run`."""
+    with record(path) as recording:
+        recording.observe(*frame(), phase="tracking")
+        if run:
+            recording.rest(
+                run.basis, run.mesh.faces, run.mesh.edges, run.camera, texture_bgr=picture(), texture_px=run.pixels
+            )
+            recording.estimate(0, 0.0, run.estimates[0])
+        raise error
+
+
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-def test_a_run_that_fails_leaves_a_complete_file(tmp_path: Path, error: type[BaseException]) -> None:
+def test_a_run_that_fails_leaves_a_complete_file(run: Run, tmp_path: Path, error: type[BaseException]) -> None:
     path = tmp_path / "failed.rrd"
-
-    def fail() -> None:
-        with record(path) as recording:
-            recording.observe(*frame(), phase="tracking")
-            raise error
-
     with pytest.raises(error):
-        fail()
+        fail(path, error, run)
     verify(path)
     assert (entities.SEEN, "Points2D:positions") in read(path)
+
+
+def test_a_run_that_fails_without_a_shape_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError):
+        fail(tmp_path / "failed.rrd", RuntimeError)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_run_is_kept_without_a_shape(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        fail(tmp_path / "interrupted.rrd", KeyboardInterrupt)
+    verify(tmp_path / "interrupted.rrd")
 
 
 def test_a_run_without_a_frame_leaves_no_file(tmp_path: Path) -> None:
