@@ -20,6 +20,7 @@ Box = tuple[int, int, int, int]
 STILLS = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff"))
 FINEST = 2.0  # texels kept per pixel of the first frame: enough for a surface that comes twice as near
 SHARPEN = 0.3  # levels: bilinear sampling bears this much minification
+SPREAD = 0.35  # new pixels, of the blur before shrinking
 STEP_PX = 4  # between the pixels whose minification is looked at
 
 
@@ -105,12 +106,11 @@ class Levels:
         h, w = picture.shape[:2]
         most = (max(1, round(FINEST * place[2])), max(1, round(FINEST * place[3])))
         if w > most[0] or h > most[1]:
-            picture = cast(Image, cv2.resize(picture, (min(w, most[0]), min(h, most[1])), interpolation=cv2.INTER_AREA))
+            picture = shrunk(picture, (min(w, most[0]), min(h, most[1])))
         self._levels = [picture]
         while max(self._levels[-1].shape[:2]) > 1:
             h, w = self._levels[-1].shape[:2]
-            half = cv2.resize(self._levels[-1], (max(1, w // 2), max(1, h // 2)), interpolation=cv2.INTER_AREA)
-            self._levels.append(cast(Image, half))
+            self._levels.append(shrunk(self._levels[-1], (max(1, w // 2), max(1, h // 2))))
 
     def seen(self, uv: Floats, cover: Floats) -> Image:
         """The picture (h, w, 4) where the places uv (h, w, 2) of the first frame are seen, as far as covered."""
@@ -145,6 +145,14 @@ class Levels:
             known[a] = np.maximum(known[a], both)
         total = cv2.GaussianBlur(wanted * known, (0, 0), 4.0) / np.maximum(cv2.GaussianBlur(known, (0, 0), 4.0), 1e-3)
         return cast(Floats, np.clip(total - SHARPEN, 0.0, len(self._levels) - 1.0).astype(np.float32))
+
+
+def shrunk(picture: Image, size: tuple[int, int]) -> Image:
+    """The picture in a smaller size (width, height); areas alone would leave a beat of fine stripes."""
+    factors = (picture.shape[1] / size[0], picture.shape[0] / size[1])
+    spread = [SPREAD * factor if factor > 1 else 1e-3 for factor in factors]
+    smooth = cv2.GaussianBlur(picture, (0, 0), sigmaX=spread[0], sigmaY=spread[1])
+    return cast(Image, cv2.resize(smooth, size, interpolation=cv2.INTER_AREA))
 
 
 def first_picture(path: Path) -> Image:

@@ -120,13 +120,12 @@ class Compositor:
 
     def settled(self, projection_px: Array, observed_px: Array, visible: Flags) -> Array:
         """The vertices (p, 2) where they are seen; the others as far off the shape as their neighbours."""
-        seen = np.where(visible[:, None], observed_px - projection_px, 0.0)
-        off = seen.copy()
+        seen = np.where(visible, (observed_px - projection_px) @ np.array((1, 1j)), 0.0)
+        off = seen
         for _ in range(ROUNDS):
             around = self._averages @ off
-            trust = 1.0 / (1.0 + (np.linalg.norm(seen - around, axis=1) / OUTLIER_PX) ** 2)
-            off = around + (trust * visible)[:, None] * (seen - around)
-        return projection_px + off
+            off = around + visible / (1.0 + (np.abs(seen - around) / OUTLIER_PX) ** 2) * (seen - around)
+        return np.asarray(projection_px + np.column_stack([off.real, off.imag]))
 
     def _blended(
         self, image: Image, surface: SurfaceMap, picture: Image, light: Floats, hidden: NDArray[np.uint8]

@@ -122,7 +122,8 @@ class Rasteriser:
         """Which triangles (m,) show their front; a sliver that noise turns over is outvoted by its neighbours."""
         areas = np.repeat(doubled_areas(points, self._faces), 3)
         around = np.bincount(self._faces.ravel(), areas, minlength=len(points))
-        return np.asarray(around[self._faces].sum(axis=1) > 0)
+        a, b, c = self._faces.T
+        return np.asarray(around[a] + around[b] + around[c] > 0)
 
     def _smooth_edge(self, points: Array, front: Flags, uv: Places, inside: NDArray[np.uint8]) -> Floats:
         """Share of the surface (h, w) in each pixel, from the distance to its outline; completes `uv` along it."""
@@ -139,10 +140,11 @@ class Rasteriser:
         segment = np.repeat(np.arange(len(outline)), count)
         step = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)
         column, row = low[segment, 0] + step % wide[segment], low[segment, 1] + step // wide[segment]
-        along = (b - a)[segment]
-        offset = np.column_stack([column, row]) - a[segment]
-        share = np.clip((offset * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-12), 0, 1)
-        distance = np.linalg.norm(offset - share[:, None] * along, axis=1)
+        start, along = a[:, 0] + 1j * a[:, 1], (b - a)[:, 0] + 1j * (b - a)[:, 1]
+        # In units of the segment: its ends are 0 and 1.
+        place = (column + 1j * row - start[segment]) / np.where(along == 0, 1e-9, along)[segment]
+        share = np.clip(place.real, 0, 1)
+        distance = np.abs(place - share) * np.abs(along)[segment]
         near = np.flatnonzero(distance < 0.5)
         # Where the outline lies before another part of the surface, that part shows through: nothing to soften.
         edge = (cv2.erode(inside, NEIGHBOURS) == 0) & (cv2.dilate(inside, NEIGHBOURS) > 0)
@@ -151,9 +153,8 @@ class Rasteriser:
         row, column, share, distance = row[near], column[near], share[near], distance[near]
         within = inside[row, column] > 0
         cover[row, column] = np.where(within, 0.5 + distance, 0.5 - distance)
-        ends = self._reference[outline[segment[near]]]
-        there = ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0])
-        uv[(row * w + column)[~within]] = (there[:, 0] + 1j * there[:, 1])[~within]
+        ends = self._reference[outline[segment[near]]] @ np.array((1, 1j))
+        uv[(row * w + column)[~within]] = (ends[:, 0] + share * (ends[:, 1] - ends[:, 0]))[~within]
         return cover
 
 

@@ -18,7 +18,7 @@ Pixels = TypeVar("Pixels", NDArray[np.uint8], NDArray[np.float32])
 
 NOISE = 5.0  # grey levels, of the camera and its compression
 MISPLACED = 0.3  # half-resolution px: how far the map may be off
-FINE_PX = 3.0  # half-resolution px: folds of this width keep their shading
+FINE_PX = 2.0  # half-resolution px: folds of this width keep their shading
 COARSE = 4  # where that is not enough to see the shading by, a grid coarser by this factor helps out
 COARSE_PX = 3.0
 TRUST = 0.1  # of the coarse estimate against the fine one
