@@ -123,9 +123,13 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Words:
     for note in playback.notes:
         progress.say(note)
     first, stop = parse_range(command.frames)
+    wanted = (playback.frames >= first) & (playback.frames < (stop or np.inf))
+    if not wanted.any():
+        numbers = f"{playback.frames[0]} to {playback.frames[-1]}"
+        raise UsageError(f"{playback.path} has no frame in {command.frames}: it contains the frames {numbers}")
     begun = interrupted = False
     with progress:
-        progress.expect(int(((playback.frames >= first) & (playback.frames < (stop or np.inf))).sum()))
+        progress.expect(int(wanted.sum()))
         try:
             for i, image in playback.images():
                 number = int(playback.frames[i])
