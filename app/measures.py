@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 WORST_FRAMES = 5
 WORST_APART = 5  # frames: neighbours of a bad frame are bad for the same reason
-SCORES = ("e3d", "e3d_camera", "e3d_static", "truth_points", "truth_frames")
+SCORES = ("e3d", "e3d_camera", "e3d_static", "e3d_sign_free", "truth_points", "truth_frames")
 PARAMETERS = ("qw", "qx", "qy", "qz", "tx_px", "ty_px", "s")
 ROWS = ("alpha", "beta", "tau")
 

@@ -77,6 +77,7 @@ def score_words(result: Score | None) -> dict[str, object]:
         "e3d": result.e3d,
         "e3d_camera": result.e3d_camera,
         "e3d_static": result.e3d_static,
+        "e3d_sign_free": result.e3d_sign_free,
         "truth_points": result.points,
         "truth_frames": len(result.frames),
     }

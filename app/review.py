@@ -120,7 +120,7 @@ def as_rows(words: Words) -> dict[str, str]:
     for stage, numbers in stages.items():
         rows[f"{stage}, ms"] = named(numbers, ("mean", "p95"), "{:.1f}")
     rows["fps"] = f"{words['fps']:.1f}" if words["fps"] else ""
-    for name in ("e3d", "e3d_camera", "e3d_static"):
+    for name in ("e3d", "e3d_camera", "e3d_static", "e3d_sign_free"):
         rows[name] = f"{words[name]:.2%}" if words[name] is not None else ""
     rows["events"] = "\n".join(f"{e['frame']}: {e['text']}" for e in events if e["text"] != note)
     rows["notes"] = "\n".join(cast(list[str], words["notes"]))

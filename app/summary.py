@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from rich.console import Console
 from rich.table import Table
 
-PERCENT = ("visible_share", "visible_share_last", "e3d", "e3d_camera", "e3d_static")
+PERCENT = ("visible_share", "visible_share_last", "e3d", "e3d_camera", "e3d_static", "e3d_sign_free")
 
 
 def as_json(words: Mapping[str, object]) -> None:

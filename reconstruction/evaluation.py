@@ -23,6 +23,7 @@ class Score:
         e3d: mean over frames of ‖Ŝ − S‖_F/‖S‖_F: centred, one scale and one depth sign for all, best rotation per frame.
         e3d_camera: the same without the rotation, so that a wrong pose counts.
         e3d_static: e3d of the rest shape alone, never deformed.
+        e3d_sign_free: e3d if each frame's depth sign may be chosen with the truth; for comparison with other systems.
         per_frame: (K,) e3d of each truth frame.
         frames: (K,) the truth frames scored.
         points: number of points scored.
@@ -31,6 +32,7 @@ class Score:
     e3d: float
     e3d_camera: float
     e3d_static: float
+    e3d_sign_free: float
     per_frame: Array
     frames: NDArray[np.int64]
     points: int
@@ -44,24 +46,31 @@ def score(shapes: Array, rest: Array, truth: Array, frames: NDArray[np.int64]) -
         e3d=float(per_frame.mean()),
         e3d_camera=float(e3d(shapes, truth, turned=False).mean()),
         e3d_static=float(e3d(still, truth).mean()),
+        e3d_sign_free=float(e3d(shapes, truth, sign_free=True).mean()),
         per_frame=per_frame,
         frames=frames,
         points=truth.shape[2],
     )
 
 
-def e3d(shapes: Array, truth: Array, *, turned: bool = True) -> Array:
-    """Error (K,) of shapes (K, 3, n) against truth (K, 3, n); `turned` grants each frame its best rotation."""
+def e3d(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = False) -> Array:
+    """Error (K,) of shapes (K, 3, n) against truth (K, 3, n).
+
+    `turned` grants each frame its best rotation, `sign_free` its own depth sign instead of one for all frames.
+    """
     truth = truth - truth.mean(axis=2, keepdims=True)
     shapes = shapes - shapes.mean(axis=2, keepdims=True)
-    candidates = []
-    for sign in (np.eye(3), MIRROR):
-        S = sign @ shapes
-        if turned:
-            S = nearest_rotation(truth @ S.transpose(0, 2, 1)) @ S
+    candidates = [shapes, MIRROR @ shapes]
+    if turned:
+        candidates = [nearest_rotation(truth @ S.transpose(0, 2, 1)) @ S for S in candidates]
+    if sign_free:  # both signs have the same size, so the one that correlates more is nearer at any scale
+        ours, mirrored = ((S * truth).sum(axis=(1, 2)) for S in candidates)
+        candidates = [np.where((ours >= mirrored)[:, None, None], *candidates)]
+    errors = []
+    for S in candidates:
         S = S * ((S * truth).sum() / (S * S).sum())
-        candidates.append(np.linalg.norm(S - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2)))
-    return np.asarray(min(candidates, key=lambda error: float(error.mean())))
+        errors.append(np.linalg.norm(S - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2)))
+    return np.asarray(min(errors, key=lambda error: float(error.mean())))
 
 
 def followed(

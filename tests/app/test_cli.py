@@ -17,7 +17,10 @@ RUN_KEYS = {
     "frames", "points", "rest_shape", "bootstrap_frames", "visible_share", "reprojection_rms_px", "fps", "stage_ms",
     "recording",
 }  # fmt: skip
-EVALUATE_KEYS = {"e3d", "e3d_camera", "e3d_static", "frames", "points", "modes", "reprojection_rms", "ms_per_frame"}
+EVALUATE_KEYS = {
+    *("e3d", "e3d_camera", "e3d_static", "e3d_sign_free"),
+    *("frames", "points", "modes", "reprojection_rms", "ms_per_frame"),
+}
 STAGES = {"decode", "track", "reconstruct", "record"}
 
 

@@ -1,5 +1,7 @@
 """Scores against ground truth, noise, missing data, and truth points followed in the mesh."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -40,6 +42,20 @@ def test_one_scale_and_one_sign_for_all_frames() -> None:
     truth = truth_of(rng)
     assert e3d(truth * np.array([1.0, 1.0, 1.0, 1.2])[:, None, None], truth).max() > 0.02
     assert e3d(np.concatenate([truth[:3], MIRROR @ truth[3:]]), truth, turned=False)[3] > 0.1
+
+
+@given(SEEDS)
+def test_each_frame_may_have_its_own_depth_sign(rng: np.random.Generator) -> None:
+    truth = truth_of(rng)
+    shapes = truth + 0.1 * rng.normal(size=truth.shape)
+    halved = np.concatenate([shapes[:2], MIRROR @ shapes[2:]])
+    free = e3d(halved, truth, sign_free=True)
+    np.testing.assert_allclose(free, e3d(shapes, truth), rtol=1e-9)
+    assert score(halved, truth[0], truth, np.arange(FRAMES)).e3d_sign_free == pytest.approx(free.mean())
+    # One sign for all leaves two frames on the wrong branch; and no other choice of signs is better.
+    assert e3d(halved, truth).mean() > free.mean() + 0.05
+    for signs in itertools.product((np.eye(3), MIRROR), repeat=FRAMES):
+        assert free.mean() <= e3d(np.stack(signs) @ halved, truth).mean() + 1e-9
 
 
 @given(SEEDS)
