@@ -1,6 +1,6 @@
 """What a run or an evaluation collects and puts out: shapes, scores, files."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -83,14 +83,17 @@ def score_words(result: Score | None) -> dict[str, object]:
     }
 
 
-def save_shapes(path: Path, estimates: Mapping[int, ShapeEstimate], model: Model) -> None:
+def save_shapes(path: Path, estimates: Mapping[int, ShapeEstimate], model: Model, lost: Iterable[int] = ()) -> None:
     """Write S (F, 3, P) camera axes, pixels; R, s, t, Lambda, faces, visible, frames, and the basis they refer to.
+
+    Frames in which the surface was lost get rows of NaN.
 
     Raises:
         UsageError: the file cannot be written.
     """
-    frames = sorted(estimates)
-    rows = [estimates[frame] for frame in frames]
+    frames = sorted({*estimates, *lost})
+    nothing = without_shape(next(iter(estimates.values())))
+    rows = [estimates.get(frame, nothing) for frame in frames]
     basis = model.basis
     with writable(path) as file:
         np.savez_compressed(
@@ -110,6 +113,26 @@ def save_shapes(path: Path, estimates: Mapping[int, ShapeEstimate], model: Model
             K=model.camera.K,
             perspective=model.camera.perspective,
         )
+
+
+def without_shape(like: ShapeEstimate) -> ShapeEstimate:
+    """An estimate of the same size that says nothing: NaN, and no point visible."""
+
+    def nan(value: Array) -> Array:
+        return np.full_like(value, np.nan)
+
+    return ShapeEstimate(
+        frame=-1,
+        quaternion=nan(like.quaternion),
+        R=nan(like.R),
+        t=nan(like.t),
+        s=np.nan,
+        Lambda=nan(like.Lambda),
+        shape=nan(like.shape),
+        projection_px=nan(like.projection_px),
+        residual_px=nan(like.residual_px),
+        visible=np.zeros_like(like.visible),
+    )
 
 
 def check_free(path: Path | None, *, overwrite: bool) -> None:

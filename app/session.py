@@ -27,9 +27,10 @@ from app.stopwatch import Stopwatch
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.model import ShapeEstimate
-from reconstruction.online import Reconstruction, Settings
+from reconstruction.online import Phase, Reconstruction, Settings
 from tracking.features import detect_corners
-from tracking.klt import Observation, PointTracker
+from tracking.guarded import Change, Guarded, GuardedTracker
+from tracking.klt import Observation
 from tracking.region import region_mask
 from tracking.tracks import Tracks, Truth
 from tracking.video import Frame, Video
@@ -63,7 +64,9 @@ class Session:
         self._watch = Stopwatch()
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
         self._frames = 0
-        self._seen: list[float] = []
+        self._seen_sum = self._seen_last = 0.0  # shares of the points
+        self._lost: list[int] = []  # frames without the surface
+        self._losses = self._recoveries = 0
         self._tracks: list[Observation] = []
         self._recording_path: Path | None = None
         self._modes: ModesBehind | None = None
@@ -149,34 +152,55 @@ class Session:
 
     def _loop(self, first: Frame, frames: Iterator[Frame]) -> None:
         with self._watch.time("track"):
-            tracker = PointTracker(first.image, self._points_px)
-        observation = Observation(self._points_px, np.ones(len(self._points_px), bool))
+            tracker = GuardedTracker(first.image, self._points_px)
+        guarded = Guarded(Observation(self._points_px, np.ones(len(self._points_px), bool)))
         frame: Frame | None = first
         while frame is not None:
             with completed():
                 if self._frames:
                     with self._watch.time("track"):
-                        observation = tracker.track(frame.image, self._reconstruction.predict())
-                self._step(frame, observation)
+                        guarded = tracker.track(frame.image, self._reconstruction.predict())
+                self._tell(frame, guarded)
+                self._step(frame, guarded.observation, lost=tracker.lost)
             with self._watch.time("decode"):
                 frame = next(frames, None)
 
-    def _step(self, frame: Frame, observation: Observation) -> None:
-        self._times[frame.index] = frame.time_s
-        self._seen.append(float(observation.visible.mean()))
+    def _tell(self, frame: Frame, guarded: Guarded) -> None:
+        """Say that the surface was lost or found; once found, nothing ties it to where it was."""
+        if guarded.change is Change.NONE:
+            return
+        if guarded.change is Change.LOST:
+            self._losses += 1
+        else:
+            self._recoveries += 1
+            self._reconstruction.restart()
+        text = f"{guarded.change.value} at frame {frame.index}: {guarded.reason}"
+        self._recording.event(frame.index, frame.time_s, text, "WARN")
+        self._progress.say(text)
+
+    def _step(self, frame: Frame, observation: Observation, *, lost: bool) -> None:
+        self._seen_last = float(observation.visible.mean())
+        self._seen_sum += self._seen_last
         if self._config.output.tracks_out:
             self._tracks.append(observation)
         self._followed.add(frame, observation)
-        phase = self._reconstruction.phase
-        with self._watch.time("reconstruct"):
-            estimates = self._reconstruction.update(observation.points_px.T, observation.visible)
+        phase = Phase.LOST if lost else self._reconstruction.phase
+        estimates: list[ShapeEstimate] = []
+        if lost:  # no shape is better than a wrong one
+            self._lost.append(frame.index)
+            if self._modelled:
+                self._followed.end()
+        else:
+            self._times[frame.index] = frame.time_s
+            with self._watch.time("reconstruct"):
+                estimates = self._reconstruction.update(observation.points_px.T, observation.visible)
         with self._watch.time("record"):
             self._recording.observe(frame, observation, phase=phase.value)
             self._settle(estimates)
         self._recording.timing(frame.index, frame.time_s, self._watch.now)
         self._watch.now.clear()
         self._frames += 1
-        self._progress.advance(self._reconstruction.phase.value, self._collected.last_rms_px)
+        self._progress.advance(phase.value if lost else self._reconstruction.phase.value, self._collected.last_rms_px)
 
     def _settle(self, estimates: list[ShapeEstimate]) -> None:
         """Record the shapes of the oldest frames that wait for one; with the first of them, the model."""
@@ -246,8 +270,11 @@ class Session:
             "bootstrap_frames": self._reconstruction.bootstrap_frames,
             "deformation": self._reconstruction.deformation,
             "focal_px": self._focal_px,
-            "visible_share": float(np.mean(self._seen)) if self._seen else None,
-            "visible_share_last": self._seen[-1] if self._seen else None,
+            "visible_share": self._seen_sum / frames if self._frames else None,
+            "visible_share_last": self._seen_last if self._frames else None,
+            "losses": self._losses,
+            "recoveries": self._recoveries,
+            "frames_lost": len(self._lost),
             "reprojection_rms_px": self._collected.reprojection_rms_px,
             "fps": self._frames / self._elapsed_s if self._elapsed_s else None,
             "stage_ms": {stage: total / frames for stage, total in self._watch.total.items()},
@@ -265,7 +292,7 @@ class Session:
             camera = self._reconstruction.camera
             Tracks(W, visible, K=camera.K if camera.perspective else None).save(output.tracks_out)
         if output.shapes_out and self._collected.estimates:
-            save_shapes(output.shapes_out, self._collected.estimates, self._reconstruction.model)
+            save_shapes(output.shapes_out, self._collected.estimates, self._reconstruction.model, self._lost)
 
 
 def free_name(folder: Path, source: str) -> Path:

@@ -134,6 +134,11 @@ class Reconstruction:
             return self._decide(last=True)
         return []
 
+    def restart(self) -> None:
+        """The surface was lost and is seen again, somewhere else: keep the model, forget the last frames."""
+        if self.window is not None:
+            self.window.restart()
+
     def finish(self) -> list[ShapeEstimate]:
         """No more frames: settle for what the bootstrap has; returns the shapes of its frames."""
         return self._decide(last=True) if self.window is None and self._waiting else []

@@ -54,6 +54,7 @@ class SlidingWindow:
         self.state: State | None = None
         self._energy, self._length, self._motion = energy, length, motion
         self._before: State | None = None  # the frame that has left the window
+        self._lost: State | None = None  # the last frame before everything started anew
         self._data: list[Statistics] = []
         self._usual = np.inf  # energy of a new frame, running mean
         self._frame = -1
@@ -68,6 +69,8 @@ class SlidingWindow:
             self._before, window = window[:1], window[1:]
             self._data.pop(0)
         found = self._adjust(window)
+        if self._lost is not None:
+            found, self._lost = min(found, self._adjust(self._lost), key=lambda one: float(one.value.sum())), None
         if self._energy.edges is not None and found.value[-1] > SURPRISE * self._usual:
             found = self._bent_otherwise(found)
         for _ in range(REWEIGHTINGS):
@@ -80,6 +83,12 @@ class SlidingWindow:
         self._usual = newest if np.isinf(self._usual) else 0.9 * self._usual + 0.1 * newest
         self.state = found.state
         return self.model.estimate(self._frame, W, visible, self.state)
+
+    def restart(self) -> None:
+        """The surface was lost: the next frame is tied to nothing, and starts from the rest or from the last shape."""
+        if self.state is not None:
+            self._lost = self.state[-1:]
+        self.state, self._before, self._data = None, None, []
 
     def predict(self) -> Array | None:
         """Image (p, 2) px of the next frame at constant velocity; None before the first frame."""

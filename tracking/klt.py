@@ -30,6 +30,7 @@ CORRECT_PX = 2.0  # larger "drift" is another place that looks alike
 RETRIEVE_PX = 8.0  # how far from where it is expected a lost point may be found
 REFINE_STEPS = 2
 RETRIEVE_STEPS = 3
+RESUME_ROUNDS = 3  # of looking for points of which only rough places are known
 PREDICTION_WEIGHT = 0.2  # of a predicted neighbour against a seen one
 
 
@@ -85,6 +86,25 @@ class PointTracker:
         points[~_inside(points, gray.shape)] = np.nan
         self._points = points
         self._affine = motion.affine
+        return Observation(points.copy(), np.isfinite(points[:, 0]))
+
+    def resume(self, image_bgr: Image, expected_px: Array) -> Observation:
+        """Find the points in a frame from their rough places alone, and go on from there.
+
+        Args:
+            image_bgr: (H, W, 3) uint8, of the reference frame's size.
+            expected_px: (P, 2) where the points are, to some pixels; NaN where that is not known.
+        """
+        self._gray = cast(Image, cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY))
+        fine, coarse = _pictures(self._gray)
+        points = np.full_like(self._reference, np.nan)
+        for _ in range(RESUME_ROUNDS):  # what is found tells better where the others are
+            sought = np.where(np.isfinite(points), points, expected_px + self._miss(points, expected_px))
+            motion = self._motion(sought, None)
+            expected = np.where(np.isfinite(points), np.nan, sought)
+            points = self._retrieve(fine, coarse, points, expected, motion)
+        points[~_inside(points, fine.shape)] = np.nan
+        self._points, self._affine = points, motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
 
     def _flow(self, gray: Image) -> Array:

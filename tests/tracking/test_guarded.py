@@ -1,0 +1,121 @@
+"""Losing the surface and finding it again."""
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.tracking.scene import SIZE, moved, texture, tilt
+from tracking.features import detect_corners
+from tracking.guarded import Change, Guarded, GuardedTracker
+from tracking.region import region_mask
+from tracking.relocation import Relocation
+
+IMAGE = texture()
+POINTS = detect_corners(cv2.cvtColor(IMAGE, cv2.COLOR_BGR2GRAY), region_mask(SIZE, (70, 55, 180, 130)), 250)
+ELSEWHERE = texture(seed=9)
+
+
+def scene(k: float) -> tuple[np.ndarray, np.ndarray]:
+    """The picture at time k and where the points are in it."""
+    forward, backward = tilt(k)
+    return moved(IMAGE, backward), forward(POINTS)
+
+
+def rough(found: np.ndarray | None, truth: np.ndarray) -> float:
+    assert found is not None
+    return float(np.nanpercentile(np.linalg.norm(found - truth, axis=1), 90))
+
+
+def followed(to: float = 0.3) -> GuardedTracker:
+    tracker = GuardedTracker(IMAGE, POINTS)
+    for k in np.linspace(0.0, to, 5)[1:]:
+        assert not tracker.track(scene(k)[0]).change.value.startswith("lost")
+    return tracker
+
+
+def right(guarded: Guarded, truth: np.ndarray) -> bool:
+    seen = guarded.observation.visible
+    return float(np.median(np.linalg.norm(guarded.observation.points_px - truth, axis=1)[seen])) < 0.3
+
+
+@pytest.mark.parametrize("k", [0.0, 0.4, 0.8, 1.2])
+def test_a_turned_surface_is_found_by_its_features(k: float) -> None:
+    image, truth = scene(k)
+    assert rough(Relocation(IMAGE, POINTS).find(image), truth) < 5.0
+
+
+def test_half_of_a_surface_is_enough() -> None:
+    image, truth = scene(0.5)
+    image[:, : SIZE[0] // 2] = ELSEWHERE[:, : SIZE[0] // 2]
+    found = Relocation(IMAGE, POINTS).find(image)
+    assert rough(found, truth) < 8.0
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_another_surface_is_not_taken_for_it(seed: int) -> None:
+    relocation = Relocation(IMAGE, POINTS)
+    assert relocation.find(texture(seed)) is None
+    assert relocation.find(np.zeros_like(IMAGE)) is None
+
+
+def test_a_cut_is_noticed_at_once_and_the_surface_found_where_it_is_now() -> None:
+    tracker = followed()
+    image, truth = scene(1.3)
+    image, truth = np.roll(image, 60, axis=1), truth + np.array([60.0, 0.0])  # too far for optical flow
+    lost = tracker.track(image)
+    assert lost.change is Change.LOST
+    assert not lost.observation.visible.any()
+    assert np.isnan(lost.observation.points_px).all()
+    found = tracker.track(image)
+    assert found.change is Change.RECOVERED
+    assert found.observation.visible.mean() > 0.5
+    assert right(found, truth)
+
+
+def test_nothing_is_seen_while_something_else_is_in_the_picture() -> None:
+    tracker = followed()
+    for frame in range(40):
+        now = tracker.track(ELSEWHERE)
+        assert now.change is (Change.LOST if frame == 0 else Change.NONE)
+        assert tracker.lost
+        assert not now.observation.visible.any()
+    image, truth = scene(0.6)
+    found = [tracker.track(image) for _ in range(10)]
+    assert sum(now.change is Change.RECOVERED for now in found) == 1
+    assert not tracker.lost
+    assert right(found[-1], truth)
+
+
+def test_a_surface_that_leaves_the_picture_is_lost_and_comes_back() -> None:
+    tracker = GuardedTracker(IMAGE, POINTS)
+    changes = []
+    for shift in [*range(0, 330, 10), *range(320, 0, -10)]:
+        image = moved(IMAGE, lambda p, dx=shift: p - [dx, 0.0])
+        image[:, : min(shift, SIZE[0])] = ELSEWHERE[:, : min(shift, SIZE[0])]
+        truth = POINTS + np.array([shift, 0.0])
+        now = tracker.track(image)
+        seen = now.observation.visible
+        assert not seen.any() or np.median(np.linalg.norm(now.observation.points_px - truth, axis=1)[seen]) < 0.5
+        changes.append(now.change)
+    assert changes.count(Change.LOST) == 1
+    assert changes.count(Change.RECOVERED) == 1
+
+
+@pytest.mark.parametrize("share", [0.4, 0.5])
+def test_a_hand_at_once_over_part_of_it_is_no_loss(share: float) -> None:
+    tracker = followed()
+    edge = np.quantile(scene(0.3)[1][:, 0], share)
+    for _ in range(10):
+        image, _ = scene(0.3)
+        image[:, : int(edge)] = ELSEWHERE[:, : int(edge)]
+        assert tracker.track(image).change is Change.NONE
+
+
+def test_a_flash_costs_only_its_frames() -> None:
+    tracker = followed()
+    image, truth = scene(0.3)
+    assert tracker.track(np.full_like(image, 255)).change is Change.LOST
+    found = tracker.track(image)
+    assert found.change is Change.RECOVERED
+    assert found.observation.visible.mean() > 0.9
+    assert right(found, truth)

@@ -1,0 +1,128 @@
+"""A tracker that knows when it has lost the surface, and finds it again."""
+
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking.klt import Observation, PointTracker
+from tracking.relocation import Relocation
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+# A hand over the sheet leaves points around it, and comes within several frames; a cut leaves 0 to 20 % at once.
+JUST_NOW = 3  # frames whose best share of points seen is compared: a surface that leaves takes longer
+COLLAPSE = 0.5  # of that share: less in one frame, and ...
+FEW = 0.4  # ... less than this share of all points, looks like a cut
+GONE = 0.1  # share of the points below which the surface is lost, however slowly it went
+FEWEST = 12  # points, below which it is lost, too
+FOUND = 0.2  # share of the points that must look right to believe that the surface is back
+SEARCH_EVERY_FRAME = 15  # so many frames it is searched for in each frame; later, to save time, ...
+SEARCH_EVERY = 5  # ... in one out of so many
+SAME = 0.75  # of the share seen before: so many at the same place need no search
+
+
+class Change(Enum):
+    """What happened between two frames."""
+
+    NONE = "none"
+    LOST = "lost"
+    RECOVERED = "recovered"
+
+
+@dataclass(frozen=True)
+class Guarded:
+    """What one frame shows, and what happened.
+
+    Attributes:
+        observation: the points; nothing is visible while the surface is lost.
+        change: whether it was lost or found in this frame.
+        reason: why, in words.
+    """
+
+    observation: Observation
+    change: Change = Change.NONE
+    reason: str = ""
+
+
+class GuardedTracker:
+    """Follows points as `PointTracker` does, and says when there is nothing to follow any more.
+
+    While the surface is lost, it is looked for where it was last seen, and by its features in the whole picture.
+
+    Args:
+        image_bgr: (H, W, 3) uint8 reference frame.
+        points_px: (P, 2) the points in it.
+
+    Attributes:
+        lost: whether the surface is lost.
+        frames_lost: for how many frames.
+    """
+
+    def __init__(self, image_bgr: Image, points_px: Array) -> None:
+        self._reference = image_bgr
+        self._points = points_px
+        self._tracker = PointTracker(image_bgr, points_px)
+        self._relocation: Relocation | None = None
+        self._shares = deque([1.0], JUST_NOW)  # of the points seen in the last frames
+        self._last_px = points_px.copy()  # where the surface was last: seen or predicted
+        self.lost = False
+        self.frames_lost = 0
+
+    def track(self, image_bgr: Image, predicted_px: Array | None = None) -> Guarded:
+        """Find the points in the next frame; `predicted_px` (P, 2) as for `PointTracker.track`."""
+        if self.lost:
+            return self._search(image_bgr)
+        observation = self._tracker.track(image_bgr, predicted_px)
+        share = float(observation.visible.mean())
+        just_now = max(self._shares)
+        jumped = share < COLLAPSE * just_now and share < FEW
+        if jumped or share < GONE or observation.visible.sum() < FEWEST:
+            self.lost, self.frames_lost = True, 1
+            how = f"only {share:.0%} of the points are seen"
+            how += f", {just_now:.0%} just before: a cut or a jump" if jumped else ": it is covered or has left the picture"
+            return Guarded(self._nothing(), Change.LOST, how)
+        self._shares.append(share)
+        seen = observation.visible[:, None]
+        self._last_px = np.where(seen, observation.points_px, self._last_px if predicted_px is None else predicted_px)
+        return Guarded(observation)
+
+    def _search(self, image_bgr: Image) -> Guarded:
+        self.frames_lost += 1
+        found = self._tracker.resume(image_bgr, self._last_px)
+        how = "where it was"
+        if self._good(found, SAME * max(self._shares)) or not self._due:
+            enough = self._good(found, FOUND)
+        else:
+            if self._relocation is None:
+                self._relocation = Relocation(self._reference, self._points)
+            places = self._relocation.find(image_bgr)
+            if places is not None:
+                relocated = self._tracker.resume(image_bgr, places)
+                if relocated.visible.sum() > found.visible.sum():
+                    found, how = relocated, "by its features"
+                else:  # the tracker goes on from what is kept
+                    found = self._tracker.resume(image_bgr, self._last_px)
+            enough = self._good(found, FOUND)
+        if not enough:
+            return Guarded(self._nothing())
+        share = float(found.visible.mean())
+        frames, self.lost, self.frames_lost = self.frames_lost - 1, False, 0
+        self._shares.clear()
+        self._shares.append(share)
+        self._last_px = np.where(found.visible[:, None], found.points_px, self._last_px)
+        lasted = f"after {frames} frame{'s' if frames > 1 else ''}"
+        return Guarded(found, Change.RECOVERED, f"found {how}, {share:.0%} of the points, {lasted}")
+
+    @property
+    def _due(self) -> bool:
+        return self.frames_lost <= SEARCH_EVERY_FRAME or self.frames_lost % SEARCH_EVERY == 0
+
+    def _good(self, observation: Observation, share: float) -> bool:
+        return observation.visible.mean() >= share and int(observation.visible.sum()) >= FEWEST
+
+    def _nothing(self) -> Observation:
+        return Observation(np.full_like(self._points, np.nan), np.zeros(len(self._points), np.bool_))
