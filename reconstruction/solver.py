@@ -1,17 +1,18 @@
 """Levenberg-Marquardt over a sliding window of frames (paper §5), with block tridiagonal normal equations."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
-from scipy.linalg.blas import dsyrk, dtrsm
-from scipy.linalg.lapack import dpotrf
+from scipy.linalg.lapack import dpbsv
 
 from reconstruction.energy import Energy, Normal, State, evaluate, linearise
 from reconstruction.statistics import Statistics
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -65,45 +66,54 @@ def minimise(energy: Energy, data: Statistics, start: State, before: State | Non
 
 def damped_step(normal: Normal, damping: float) -> Array:
     """Marquardt's step (n, d): the diagonal raised by a share of itself."""
-    diagonal = normal.diagonal.copy()
-    index = np.arange(diagonal.shape[1])
-    scale = diagonal[:, index, index]
-    diagonal[:, index, index] += damping * scale + 1e-10 * (1 + scale.max())
+    band = banded(normal.diagonal, normal.coupling)
+    scale = band[:, 0].reshape(normal.gradient.shape)
+    scale += damping * scale + 1e-10 * (1 + scale.max())
     try:
-        return -solve_block_tridiagonal(diagonal, normal.coupling, normal.gradient)
+        return -solve_banded(band, normal.gradient)
     except LinAlgError:
         return np.full_like(normal.gradient, np.nan)
 
 
-def solve_block_tridiagonal(diagonal: Array, coupling: Array, right: Array) -> Array:
-    """Solve the symmetric positive definite block tridiagonal system by block Cholesky, O(n d³).
+def banded(diagonal: Array, coupling: Array) -> Array:
+    """The lower band of a symmetric block tridiagonal matrix: row j holds what stands in column j, downwards from (j, j).
+
+    Neighbours couple θ with θ and every other parameter with itself, so the band is hardly wider than one block; a
+    Cholesky factor within it takes half the work of one by blocks, O(n d³).
 
     Args:
         diagonal: (n, d, d) diagonal blocks.
         coupling: (n-1, d, d) blocks above the diagonal.
-        right: (n, d).
+
+    Returns:
+        (n d, width).
+    """
+    n, d, _ = diagonal.shape
+    linked = np.flatnonzero(coupling.any(axis=0)) if n > 1 else np.empty(0, np.int64)
+    a, b = np.divmod(linked, d)
+    width = d + 1 + int((b - a).max()) if len(linked) else d
+    band = np.zeros((n, d * width))
+    inside, place = lower_triangle(d, width)
+    for frame, block in zip(band, diagonal.reshape(n, -1), strict=True):
+        frame[place] = block[inside]
+    band[:-1, d + b - a + a * width] = coupling.reshape(n - 1, d * d)[:, linked]
+    return band.reshape(n * d, width)
+
+
+@lru_cache
+def lower_triangle(d: int, width: int) -> tuple[Indices, Indices]:
+    """Where the lower triangle of a (d, d) block is: in the block, and in the band; both flat."""
+    row, column = np.tril_indices(d)
+    return row * d + column, row - column + column * width
+
+
+def solve_banded(band: Array, right: Array) -> Array:
+    """Solve the positive definite system with this lower band, which is overwritten; right (n, d).
 
     Raises:
         LinAlgError: the matrix is not positive definite.
     """
-    n = len(diagonal)
-    factors: list[Array] = []
-    links: list[Array] = []  # L_i⁻¹ U_i
-    y = np.empty_like(right)
-    for i in range(n):
-        block, b = diagonal[i], right[i]
-        if i:
-            block = block - dsyrk(1.0, links[-1], trans=1, lower=1)
-            b = b - links[-1].T @ y[i - 1]
-        factor, failed = dpotrf(block, lower=1, clean=0)
-        if failed:
-            raise LinAlgError("not positive definite")
-        factors.append(factor)
-        y[i] = dtrsm(1.0, factor, b[:, None], lower=1)[:, 0]
-        if i < n - 1:
-            links.append(dtrsm(1.0, factor, coupling[i], lower=1))
-    x = np.empty_like(right)
-    for i in range(n - 1, -1, -1):
-        b = y[i] - links[i] @ x[i + 1] if i < n - 1 else y[i]
-        x[i] = dtrsm(1.0, factors[i], b[:, None], lower=1, trans_a=1)[:, 0]
-    return x
+    _, x, failed = dpbsv(band.T, right.ravel(), lower=1, overwrite_ab=1)
+    if failed:
+        raise LinAlgError("not positive definite")
+    return np.asarray(x.reshape(right.shape))

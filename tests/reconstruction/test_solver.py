@@ -10,7 +10,7 @@ from scipy.linalg import LinAlgError
 
 from reconstruction.camera import Camera, quaternion_exp, quaternion_from_rotation, quaternion_product
 from reconstruction.energy import Energy, State, evaluate
-from reconstruction.solver import Solver, minimise, solve_block_tridiagonal
+from reconstruction.solver import Solver, banded, minimise, solve_banded
 from tests.reconstruction.world import CAMERAS, SEEDS, model_of, relief, seen, shape_error, statistics_of, turns
 
 
@@ -24,13 +24,30 @@ def test_block_solve_is_the_dense_solve(rng: np.random.Generator, n: int, d: int
     diagonal = np.stack([full[i, :, i] for i in range(n)])
     coupling = np.stack([full[i, :, i + 1] for i in range(n - 1)]) if n > 1 else np.zeros((0, d, d))
     right = rng.normal(size=(n, d))
-    x = solve_block_tridiagonal(diagonal, coupling, right)
+    x = solve_banded(banded(diagonal, coupling), right)
     np.testing.assert_allclose(full.reshape(n * d, n * d) @ x.ravel(), right.ravel(), atol=1e-7 * (1 + np.abs(x).max()))
+
+
+@given(SEEDS, st.integers(0, 4))
+def test_the_band_is_as_wide_as_the_coupling_reaches(rng: np.random.Generator, reach: int) -> None:
+    n, d = 3, 5
+    blocks = rng.normal(size=(n, d, d))
+    diagonal = blocks + blocks.transpose(0, 2, 1)
+    coupling = np.stack([np.diag(rng.random(d - reach), reach)] * (n - 1))
+    band = banded(diagonal, coupling)
+    assert band.shape == (n * d, d + 1 + reach)
+    full = np.zeros((n * d, n * d))
+    for offset in range(band.shape[1]):
+        full += np.diag(band[: n * d - offset, offset], -offset)
+    full = (full + np.tril(full, -1).T).reshape(n, d, n, d)
+    np.testing.assert_array_equal(np.stack([full[i, :, i] for i in range(n)]), diagonal)
+    np.testing.assert_array_equal(np.stack([full[i, :, i + 1] for i in range(n - 1)]), coupling)
+    np.testing.assert_array_equal(full[0, :, 2], 0.0)
 
 
 def test_indefinite_systems_are_refused() -> None:
     with pytest.raises(LinAlgError):
-        solve_block_tridiagonal(np.stack([np.eye(2), -np.eye(2)]), np.zeros((1, 2, 2)), np.ones((2, 2)))
+        solve_banded(banded(np.stack([np.eye(2), -np.eye(2)]), np.zeros((1, 2, 2))), np.ones((2, 2)))
 
 
 def scene(rng: np.random.Generator, camera: Camera, frames: int = 5, modes: int = 4):  # type: ignore[no-untyped-def]
