@@ -6,7 +6,7 @@ BIN := .venv/bin
 OPENCV4 := 4.14.0.94
 BIN4 := .venv-opencv4/bin
 
-.PHONY: demo test test-opencv4 lint types clean
+.PHONY: demo test test-opencv4 lint types pictures clean
 
 demo: .venv/ready
 	$(BIN)/modeshape demo
@@ -24,6 +24,10 @@ lint: .venv/ready
 
 types: .venv/ready
 	$(BIN)/mypy
+
+# Those of the README, in docs/.
+pictures: demo
+	$(BIN)/python -m docs.pictures
 
 # By the environment, since pip then pins what builds the package, too.
 .venv/ready: pyproject.toml constraints.txt

@@ -39,14 +39,14 @@ def mortal_viewer(tmp_path: Path) -> Iterator[Viewer]:
 
 
 @contextmanager
-def headless_viewer(folder: Path) -> Iterator[Viewer]:
+def headless_viewer(folder: Path, size: tuple[int, int] = (1600, 1000)) -> Iterator[Viewer]:
     """Skips the test where no viewer runs, unless CI=true; its output goes to a file in the folder."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     # The binary itself: the `rerun` on PATH is a launcher that would leave it running.
     program = Path(rerun_cli.__file__).with_name("rerun")
-    options = ["--headless", "--window-size", "1600x1000", "--hide-welcome-screen", "--bind", "127.0.0.1"]
+    options = ["--headless", "--window-size", f"{size[0]}x{size[1]}", "--hide-welcome-screen", "--bind", "127.0.0.1"]
     log = folder / "viewer.txt"
     with log.open("w") as output:
         process = subprocess.Popen(

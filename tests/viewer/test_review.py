@@ -2,20 +2,18 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from app.config import Review
 from app.progress import Progress
 from app.review import review
 from tests.synthetic_run import CORNERS_BGR, write_run
 from tests.viewer.conftest import Viewer
+from tests.viewer.screenshot import SETTLE_S, shot
 
 pytestmark = pytest.mark.viewer
 
-SETTLE_S = 20.0
 FRAMES = 40
 
 
@@ -24,20 +22,6 @@ def wait(until: Callable[[], bool]) -> None:
     while not until() and time.monotonic() < end:
         time.sleep(0.1)
     assert until()
-
-
-def shot(viewer: Viewer, name: str, frame: int) -> NDArray[np.uint8]:
-    viewer.client.set_time("frame", sequence=frame, play_state="paused")
-    [view] = [view for view in viewer.client.get_state().views if view.name.startswith(name)]
-    viewer.client.take_screenshot(view.view_id)  # the first one may be of a half-loaded scene
-    picture, before = b"", b"-"
-    end = time.monotonic() + SETTLE_S
-    while picture != before and time.monotonic() < end:
-        time.sleep(0.2)
-        picture, before = viewer.client.take_screenshot(view.view_id), picture
-    decoded = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
-    assert decoded is not None
-    return np.asarray(decoded, np.uint8)
 
 
 def test_view_uses_the_viewer_that_runs(mortal_viewer: Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,21 +1,19 @@
 import time
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from app.recording import Recording
 from app.scenery import PREDICTED_RGB, SEEN_RGB
 from tests.synthetic_run import CORNERS_BGR, SIZE, Run, verify, write_run
 from tests.viewer.conftest import Viewer
+from tests.viewer.screenshot import SETTLE_S, shot
 from tracking.video import Frame
 
 pytestmark = pytest.mark.viewer
 
 FRAMES = 40
-SETTLE_S = 20.0
 
 
 @pytest.fixture(scope="module")
@@ -26,21 +24,6 @@ def run(viewer: Viewer, tmp_path_factory: pytest.TempPathFactory) -> Run:
     while viewer.client.get_state().loading and time.monotonic() < end:
         time.sleep(0.1)
     return run
-
-
-def shot(viewer: Viewer, name: str, frame: int) -> NDArray[np.uint8]:
-    """(h, w, 3) BGR picture of the view whose name starts like this, once it has settled."""
-    viewer.client.set_time("frame", sequence=frame, play_state="paused")
-    [view] = [view for view in viewer.client.get_state().views if view.name.startswith(name)]
-    viewer.client.take_screenshot(view.view_id)  # the first one may be of a half-loaded scene
-    picture, before = b"", b"-"
-    end = time.monotonic() + SETTLE_S
-    while picture != before and time.monotonic() < end:
-        time.sleep(0.2)
-        picture, before = viewer.client.take_screenshot(view.view_id), picture
-    decoded = cv2.imdecode(np.frombuffer(picture, np.uint8), cv2.IMREAD_COLOR)
-    assert decoded is not None
-    return np.asarray(decoded, np.uint8)
 
 
 @pytest.mark.usefixtures("run")
