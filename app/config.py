@@ -17,8 +17,9 @@ class Model:
 
     bootstrap_frames: Literal["auto"] | int = "auto"
     """Frames the rest shape comes from; auto decides from the evidence."""
-    metric: Literal["euclidean", "manhattan"] = "euclidean"
-    """Distance between points that the modes come from: straight, or along the mesh's edges."""
+    metric: Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"] = "euclidean"
+    """Distance between points that the modes come from: straight, along the mesh's edges, in units of the extent along
+    each axis, chi-squared of the coordinates, or Jensen-Shannon of the nearness to landmarks."""
     modes: int = 20
     """Number of modes r."""
     deformation: Literal["auto", "bending", "stretching", "general", "inextensible"] = "auto"

@@ -2,6 +2,7 @@
 
 import zipfile
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from app.progress import Progress
 from app.results import check_free, writable
 from reconstruction import distances
 from reconstruction.mesh import Mesh
-from reconstruction.modes import ModalBasis, doubly_centred
+from reconstruction.modes import Metric, ModalBasis, doubly_centred
 
 Array = NDArray[np.float64]
 
@@ -79,7 +80,7 @@ def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh
 
 def spectrum(basis: ModalBasis, mesh: Mesh, metric: str) -> Array:
     """All eigenvalues (p,) of −½CDC, descending."""
-    D = distances.manhattan(basis.rest, mesh.edges) if metric == "manhattan" else distances.euclidean(basis.rest)
+    D = distances.dissimilarity(cast(Metric, metric), basis.rest, mesh.edges)
     return np.asarray(np.linalg.eigvalsh(doubly_centred(D))[::-1], np.float64)
 
 

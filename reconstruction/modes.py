@@ -1,7 +1,6 @@
 """Mode shapes Υ and principal axes Φ of a rest shape (paper §3.2, Eq. 2-6)."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from reconstruction import ReconstructionError, distances
 from reconstruction.mesh import Mesh
 
 Array = NDArray[np.float64]
-Metric = Literal["euclidean", "manhattan"]
+Metric = distances.Metric
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean
     if not 1 <= modes < p:
         raise ReconstructionError(f"--modes {modes} does not fit {p} points: choose 1 to {p - 1}")
     rest = rest - rest.mean(axis=1, keepdims=True)
-    D = distances.euclidean(rest) if metric == "euclidean" else distances.manhattan(rest, mesh.edges)
+    D = distances.dissimilarity(metric, rest, mesh.edges)
     eigenvalues, Upsilon = leading_eigenpairs(doubly_centred(D), modes)
     return ModalBasis(rest, Upsilon, eigenvalues, principal_axes(rest))
 

@@ -7,8 +7,12 @@ from hypothesis import strategies as st
 from scipy.spatial import distance_matrix
 
 from reconstruction import ReconstructionError, distances
+from reconstruction.distances import Metric
 from reconstruction.mesh import triangulate
-from tests.reconstruction.world import SEEDS, relief
+from tests.reconstruction.world import SEEDS, flat, random_rotation, relief
+
+OURS: tuple[Metric, ...] = ("mahalanobis", "chi-squared", "jensen-shannon")
+NO_EDGES = np.empty((0, 2), np.int64)
 
 
 @given(SEEDS, st.integers(2, 50))
@@ -44,3 +48,40 @@ def test_mesh_in_pieces_has_no_paths() -> None:
     rest = np.random.default_rng(0).normal(size=(3, 6))
     with pytest.raises(ReconstructionError, match=r"falls into pieces.*--metric euclidean"):
         distances.manhattan(rest, np.array([[0, 1], [1, 2], [3, 4], [4, 5]]))
+
+
+@pytest.mark.parametrize("metric", OURS)
+@pytest.mark.parametrize("surface", [relief, flat])
+@given(rng=SEEDS)
+def test_others_are_dissimilarities_whatever_the_pose_and_size(rng, metric: Metric, surface) -> None:  # type: ignore[no-untyped-def]
+    rest = surface(rng, 30)
+    D = distances.dissimilarity(metric, rest, NO_EDGES)
+    assert np.isfinite(D).all()
+    np.testing.assert_allclose(D, D.T)
+    np.testing.assert_array_equal(np.diag(D), 0)
+    assert D[~np.eye(30, dtype=bool)].min() > 0
+    moved = distances.dissimilarity(metric, 3.0 * random_rotation(rng) @ rest + rng.normal(size=(3, 1)), NO_EDGES)
+    np.testing.assert_allclose(moved / moved.max(), D / D.max(), atol=1e-6)
+
+
+@given(SEEDS)
+def test_mahalanobis_sees_no_stretch_of_a_solid(rng: np.random.Generator) -> None:
+    rest = rng.normal(size=(3, 500))
+    longer = np.array([[2.0], [1.0], [1.0]]) * rest
+    D, stretched = distances.mahalanobis(rest), distances.mahalanobis(longer)
+    np.testing.assert_allclose(stretched, D, rtol=0.06)
+
+
+def test_chi_squared_sees_more_near_the_ends() -> None:
+    line = np.stack([np.linspace(-1, 1, 41), np.zeros(41), np.zeros(41)])
+    steps = np.diag(distances.chi_squared(line), 1)
+    np.testing.assert_allclose(steps, steps[::-1])
+    assert (np.diff(steps[:20]) < 0).all()
+
+
+def test_jensen_shannon_levels_off_far_away() -> None:
+    line = np.stack([np.linspace(-1, 1, 41), np.zeros(41), np.zeros(41)])
+    D = distances.jensen_shannon(line)
+    assert D.max() <= np.sqrt(np.log(2))
+    assert D[0, 40] < 1.1 * D[0, 30]
+    assert D[0, 10] > 0.45 * D[0, 30]

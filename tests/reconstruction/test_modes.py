@@ -18,7 +18,7 @@ from reconstruction.modes import (
 )
 from tests.reconstruction.world import SEEDS, flat, relief
 
-METRICS: tuple[Metric, ...] = ("euclidean", "manhattan")
+METRICS: tuple[Metric, ...] = ("euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon")
 
 
 def basis_of(rest: np.ndarray, modes: int, metric: Metric = "euclidean") -> ModalBasis:
@@ -47,7 +47,7 @@ def test_unsquared_distances_have_one_zero_eigenvalue_and_no_negative_one(rng, p
 def test_modes_are_the_leading_eigenvectors(p: int, modes: int, metric: Metric) -> None:
     rest = relief(np.random.default_rng(p), p)
     basis = basis_of(rest, modes, metric)
-    D = distances.euclidean(rest) if metric == "euclidean" else distances.manhattan(rest, triangulate(rest[:2].T).edges)
+    D = distances.dissimilarity(metric, rest - rest.mean(axis=1, keepdims=True), triangulate(rest[:2].T).edges)
     centred = doubly_centred(D)
     values = np.linalg.eigvalsh(centred)[::-1]
     np.testing.assert_allclose(basis.eigenvalues, values[:modes], rtol=1e-8)
