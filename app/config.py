@@ -140,8 +140,10 @@ class Evaluate:
     """Share of the entries hidden at random."""
     noise: float = 0.0
     """Gaussian noise, as a share of the largest distance of a point to the centroid."""
+    outliers: float = 0.0
+    """Share of the entries put anywhere among the others."""
     seed: int = 0
-    """Of the noise and the hidden entries."""
+    """Of the noise, the hidden entries and the outliers."""
     shapes_out: Path | None = None
     """Save the shapes as .npz: S (F, 3, P) camera axes, R, s, t, Lambda, faces, visible."""
     overwrite: bool = False
@@ -153,6 +155,8 @@ class Evaluate:
     def __post_init__(self) -> None:
         if not 0 <= self.missing < 1:
             raise UsageError(f"--missing {self.missing} is no share: give 0 to less than 1")
+        if not 0 <= self.outliers < 1:
+            raise UsageError(f"--outliers {self.outliers} is no share: give 0 to less than 1")
         if self.noise < 0:
             raise UsageError(f"--noise {self.noise} is no noise level: give 0 and more")
         if self.seed < 0:

@@ -15,7 +15,7 @@ from app.progress import Progress
 from app.results import Collected, check_free, save_shapes, score_words
 from reconstruction import rest_shape
 from reconstruction.camera import Camera
-from reconstruction.evaluation import score, with_missing, with_noise
+from reconstruction.evaluation import score, with_missing, with_noise, with_outliers
 from reconstruction.mesh import Mesh
 from reconstruction.online import Reconstruction, Settings
 from reconstruction.rest_shape import RestShape
@@ -37,6 +37,8 @@ def evaluate(config: Evaluate, progress: Progress) -> Words:
     rng = np.random.default_rng(config.seed)
     W = with_noise(np.where(tracks.visible[:, None], tracks.W, np.nan), config.noise, rng)
     visible = with_missing(tracks.visible, config.missing, rng)
+    if config.outliers:
+        W = with_outliers(W, tracks.visible, config.outliers, rng)
     reconstruction = prepare(config, tracks)
     collected = Collected(everything=True)
     with threadpool_limits(1), progress:

@@ -115,3 +115,13 @@ def with_noise(W: Array, level: float, rng: np.random.Generator) -> Array:
 def with_missing(visible: NDArray[np.bool_], share: float, rng: np.random.Generator) -> NDArray[np.bool_]:
     """Visibility (F, p) with a share of its entries hidden uniformly at random."""
     return visible & (rng.random(visible.shape) >= share)
+
+
+def with_outliers(W: Array, visible: NDArray[np.bool_], share: float, rng: np.random.Generator) -> Array:
+    """Observations (F, 2, p) of which a share lies anywhere in the bounding box of what is visible (F, p)."""
+    gross = visible & (rng.random(visible.shape) < share)
+    if not gross.any():
+        return W
+    seen = W.transpose(0, 2, 1)[visible]
+    low, high = seen.min(axis=0)[:, None], seen.max(axis=0)[:, None]
+    return np.asarray(np.where(gross[:, None], rng.uniform(low, high, W.shape), W))

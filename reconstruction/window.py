@@ -24,7 +24,7 @@ Visibility = NDArray[np.bool_]
 
 FEWEST_POINTS = 4
 ROBUST_SIGMAS = 8.0  # deviations from the model beyond which a point counts less
-GROSS_SIGMAS = 20.0  # deviations from the common motion beyond which a point is no sound start
+GROSS_SIGMAS = 7.0  # deviations from the common motion beyond which a point is no sound start
 REWEIGHTINGS = 5  # most rounds of robust weights: one for clean points, more while gross outliers still pull
 REWEIGHTED = 0.005  # share of the weights that must change for another round
 SURPRISE = 2.0  # times the usual energy of a new frame, above which other bends are tried

@@ -42,6 +42,28 @@ def test_evaluate(modeshape: Command, shared_data: Path, arguments: tuple[object
         assert words["e3d_static"] == pytest.approx(static, abs=0.001)
 
 
+@pytest.mark.parametrize(
+    ("option", "share", "factor"),
+    [
+        ("--missing", 0.2, 1.1),
+        ("--missing", 0.4, 1.2),
+        ("--missing", 0.6, 1.4),
+        ("--missing", 0.8, 2.0),
+        ("--outliers", 0.1, 1.3),
+    ],
+)
+@pytest.mark.parametrize("seed", [0, 3])
+def test_missing_points_and_outliers_cost_little(
+    modeshape: Command, shared_data: Path, option: str, share: float, factor: float, seed: int
+) -> None:
+    def e3d(*options: object) -> float:
+        outcome = modeshape("evaluate", shared_data / FLAG[0], *FLAG[1:], *options, "--json")
+        assert outcome.code == 0, outcome.err
+        return float(json.loads(outcome.out)["e3d"])
+
+    assert e3d(option, share, "--seed", seed) <= factor * e3d()
+
+
 def test_more_modes_explain_more(modeshape: Command, shared_data: Path) -> None:
     errors = []
     for modes in (5, 10, 20, 30):

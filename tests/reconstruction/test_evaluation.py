@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reconstruction import ReconstructionError
-from reconstruction.evaluation import MIRROR, e3d, followed, score, with_missing, with_noise
+from reconstruction.evaluation import MIRROR, e3d, followed, score, with_missing, with_noise, with_outliers
 from reconstruction.mesh import triangulate
 from tests.reconstruction.world import SEEDS, random_rotation, relief, turn
 
@@ -138,3 +138,16 @@ def test_missing_entries_are_a_share_drawn_by_the_seed() -> None:
     np.testing.assert_array_equal(left, with_missing(visible, 0.4, np.random.default_rng(3)))
     assert (left != with_missing(visible, 0.4, np.random.default_rng(4))).any()
     np.testing.assert_array_equal(with_missing(visible, 0.0, np.random.default_rng(3)), visible)
+
+
+def test_outliers_are_a_share_drawn_by_the_seed_and_lie_among_the_points() -> None:
+    rng = np.random.default_rng(0)
+    W, visible = rng.normal(100.0, 10.0, (100, 2, 200)), rng.random((100, 200)) < 0.9
+    wild = with_outliers(np.where(visible[:, None], W, np.nan), visible, 0.1, np.random.default_rng(3))
+    moved = visible & (wild != W).any(axis=1)
+    assert moved.sum() / visible.sum() == pytest.approx(0.1, abs=0.01)
+    assert np.isnan(wild[:, 0][~visible]).all()
+    assert wild[:, 0][moved].min() >= W[:, 0][visible].min()
+    assert wild[:, 0][moved].max() <= W[:, 0][visible].max()
+    np.testing.assert_array_equal(with_outliers(W, visible, 0.0, np.random.default_rng(3)), W)
+    assert with_outliers(W, np.zeros_like(visible), 0.5, np.random.default_rng(3)) is W
