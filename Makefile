@@ -6,13 +6,16 @@ BIN := .venv/bin
 OPENCV4 := 4.14.0.94
 BIN4 := .venv-opencv4/bin
 
-.PHONY: demo test test-opencv4 lint types pictures clean
+.PHONY: demo test test-slow test-opencv4 lint types pictures clean
 
 demo: .venv/ready
 	$(BIN)/modeshape demo
 
 test: .venv/ready
 	$(BIN)/python -m pytest
+
+test-slow: .venv/ready
+	$(BIN)/python -m pytest -m slow
 
 test-opencv4: .venv-opencv4/ready
 	$(BIN4)/python -c 'import cv2; assert cv2.__version__.startswith("4."), cv2.__version__'
