@@ -69,7 +69,12 @@ def from_video(file: RecordingFile, frames: list[int], suffix: str) -> Iterator[
     with TemporaryDirectory() as folder:
         path = Path(folder, f"video{suffix}")
         asset = file.rows(lambda entity, component: (entity, component) == (entities.IMAGE, VIDEO))
-        path.write_bytes(cast(bytes, asset.static(entities.IMAGE, VIDEO)))
+        try:
+            path.write_bytes(cast(bytes, asset.static(entities.IMAGE, VIDEO)))
+        except OSError as error:
+            raise UsageError(
+                f"cannot unpack the video in {file.path} to {folder}: {error.strerror}; free some space"
+            ) from error
         del asset
         try:
             with Video(str(path), frames[0], frames[-1] + 1) as video:
