@@ -3,7 +3,6 @@
 What is written where is listed in `app.entities`.
 """
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import entities
-from app.chunks import STATIC, RecordingFile
+from app.chunks import RecordingFile
 from app.errors import UsageError
 from app.stored_images import stored_images
 from app.stored_model import MODEL, TEXTURE, Modelled, modelled_part
+from app.stored_observations import OBSERVATION, POSITIONS, observed_part
+from app.stored_words import DOCUMENT, NAME, SCALARS, document, events, recording_name, stages
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.energy import State
 from reconstruction.mesh import Mesh
@@ -28,12 +29,6 @@ Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
 ESTIMATE = "modeshape.Estimate:"
-OBSERVATION = "modeshape.Observation:"
-DOCUMENT = "modeshape.Document:"
-POSITIONS = "Points2D:positions"
-SCALARS = "Scalars:scalars"
-NAME = ("__properties", "RecordingInfo:name")
-STAGES = ("decode", "track", "reconstruct", "record")  # in this order, before any others
 
 
 @dataclass(frozen=True)
@@ -101,20 +96,12 @@ class Playback:
     @classmethod
     def _of(cls, file: RecordingFile) -> Self:
         rows = file.rows(wanted)
-        observed = rows.last(entities.OBSERVATION, f"{OBSERVATION}visible")
-        seen = rows.last(entities.SEEN, POSITIONS)
-        phases = rows.last(entities.OBSERVATION, f"{OBSERVATION}phase")
-        numbers = sorted(observed.keys() & seen.keys() & phases.keys())  # what was cut off may have one without another
-        if not numbers:
+        observed = observed_part(rows)
+        if observed is None:
             raise UsageError(f"{file.path} contains no frame: the run ended before its first, or its start was lost")
-        visible = np.stack([cast(NDArray[np.bool_], observed[k].value) for k in numbers])
-        points = np.full((*visible.shape, 2), np.nan)
-        positions = np.concatenate([cast(Array, seen[k].value) for k in numbers])
-        if len(positions) != visible.sum():
-            raise ValueError("the points and their visibility disagree")
-        points[visible] = positions
         modelled = modelled_part(rows)
         modes = len(modelled.model.basis.eigenvalues) if modelled else 0
+        numbers = observed.frames.tolist()
 
         def by_frame(entity: str, component: str, width: int) -> Array:
             values, found = np.full((len(numbers), width), np.nan), rows.last(entity, component)
@@ -123,15 +110,8 @@ class Playback:
                     values[i] = cast(Array, found[frame].value)
             return values
 
-        def document(entity: str) -> tuple[dict[str, object] | None, str]:
-            texts = rows.last(entity, f"{DOCUMENT}json")
-            if STATIC not in texts:
-                return None, "unknown"
-            version = cast(list[str], rows.static(entity, f"{DOCUMENT}version"))[0]
-            return json.loads(cast(list[str], texts[STATIC].value)[0]), version
-
-        configuration, version = document(entities.CONFIGURATION)
-        summary = document(entities.SUMMARY)[0]
+        configuration, version = document(rows, entities.CONFIGURATION)
+        summary = document(rows, entities.SUMMARY)[0]
         notes = []
         if file.cut_off:
             notes.append(f"{file.path} is cut off: {len(numbers)} frames, up to number {numbers[-1]}, could be read")
@@ -139,28 +119,20 @@ class Playback:
             notes.append(f"{file.path} is of a run that was ended before it was complete: it has no summary")
         if modelled is None:
             notes.append(f"{file.path} contains no shapes: the run ended before its rest shape was found")
-        found = [e.split("/", 1)[1] for e, c in rows.found if e.startswith(f"{entities.TIMING}/") and c == SCALARS]
-        stages = sorted(found, key=lambda stage: STAGES.index(stage) if stage in STAGES else len(STAGES))
-        texts = {row.id: cast(list[str], row.value)[0] for row in rows.all(entities.EVENTS, "TextLog:text")}
-        levels = {row.id: cast(list[str], row.value)[0] for row in rows.all(entities.EVENTS, "TextLog:level")}
-        names = rows.last(*NAME)
         return cls(
             path=file.path,
-            name=cast(list[str], names[STATIC].value)[0] if STATIC in names else file.path.stem,
+            name=recording_name(rows) or file.path.stem,
             version=version,
             configuration=configuration or {},
             summary=summary,
             notes=tuple(notes),
-            frames=np.array(numbers, np.int64),
-            times_s=np.array([observed[k].time_s for k in numbers]),
-            phases=[cast(list[str], phases[k].value)[0] for k in numbers],
-            stage_ms={stage: by_frame(f"{entities.TIMING}/{stage}", SCALARS, 1)[:, 0] for stage in stages},
-            events=[
-                (row.frame, row.time_s, levels.get(row.id, "INFO"), texts[row.id])
-                for row in rows.all(entities.EVENTS, "TextLog:text")
-            ],
-            W=points.transpose(0, 2, 1).copy(),
-            visible=visible,
+            frames=observed.frames,
+            times_s=observed.times_s,
+            phases=observed.phases,
+            stage_ms={stage: by_frame(f"{entities.TIMING}/{stage}", SCALARS, 1)[:, 0] for stage in stages(rows)},
+            events=events(rows),
+            W=observed.W,
+            visible=observed.visible,
             quaternion=by_frame(entities.ESTIMATE, f"{ESTIMATE}quaternion", 4),
             t=by_frame(entities.ESTIMATE, f"{ESTIMATE}t", 2),
             s=by_frame(entities.ESTIMATE, f"{ESTIMATE}s", 1)[:, 0],
