@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.playback import Playback
+from reconstruction.camera import rotation_from_quaternion
 
 Array = NDArray[np.float64]
 
@@ -21,8 +22,7 @@ def camera_path(playback: Playback, rows: NDArray[np.int64]) -> tuple[Array, Arr
     A rotation's columns are the camera's x (right), y (down) and z (forward). An orthographic camera has no
     position: NaN.
     """
-    estimates = [e for e in map(playback.estimate, rows.tolist()) if e is not None]
-    R = np.array([e.R for e in estimates]).reshape(-1, 3, 3)
+    R = rotation_from_quaternion(playback.quaternion[rows])
     camera = playback.camera
     if not camera.perspective:
         return R.transpose(0, 2, 1), np.full((len(R), 3), np.nan)
@@ -32,7 +32,7 @@ def camera_path(playback: Playback, rows: NDArray[np.int64]) -> tuple[Array, Arr
 
 
 def write_npz(playback: Playback, file: BinaryIO, advance: Callable[[], None]) -> None:
-    """Everything as arrays; rows are the F frames that have a shape, P points, r modes.
+    """Everything as arrays; rows are the F frames that have a shape, or NaN where the surface was lost; P points, r modes.
 
     The keys of --shapes-out, with the same values: S (F, 3, P) shapes in camera axes, R (F, 3, 3), s (F,), t (F, 2),
     Lambda (F, 3, r), visible (F, P), frames (F,), faces (m, 3), rest (3, P), Upsilon (r, P), eigenvalues (r,), Phi (3, 3),
@@ -40,19 +40,19 @@ def write_npz(playback: Playback, file: BinaryIO, advance: Callable[[], None]) -
     shapes; times_s (F,); quaternion (F, 4) of R, w first; camera_R, camera_position (see `camera_path`);
     texture_px (P, 2) the points in the first frame.
     """
-    rows = np.flatnonzero(playback.shaped)
-    estimates = []
-    for row in rows.tolist():
-        estimate = playback.estimate(row)
-        assert estimate is not None
-        estimates.append(estimate)
+    rows = np.flatnonzero(playback.shaped | (np.array([phase.lower() for phase in playback.phases]) == "lost"))
+    shapes = np.full((len(rows), *playback.basis.rest.shape), np.nan)
+    projections = np.full((len(rows), 2, shapes.shape[2]), np.nan)
+    for k, row in enumerate(rows.tolist()):
+        if estimate := playback.estimate(row):
+            shapes[k], projections[k] = estimate.shape, estimate.projection_px.T
         advance()
     basis, camera = playback.basis, playback.camera
     camera_R, camera_position = camera_path(playback, rows)
     np.savez_compressed(
         file,
-        S=np.stack([e.shape for e in estimates]),
-        R=np.stack([e.R for e in estimates]),
+        S=shapes,
+        R=camera_R.transpose(0, 2, 1),
         s=playback.s[rows],
         t=playback.t[rows],
         Lambda=playback.Lambda[rows],
@@ -66,7 +66,7 @@ def write_npz(playback: Playback, file: BinaryIO, advance: Callable[[], None]) -
         K=camera.K,
         perspective=camera.perspective,
         W=playback.W[rows],
-        projection=np.stack([e.projection_px.T for e in estimates]),
+        projection=projections,
         times_s=playback.times_s[rows],
         quaternion=playback.quaternion[rows],
         camera_R=camera_R,

@@ -5,6 +5,8 @@ import json
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import cv2
@@ -17,8 +19,10 @@ from app.config_export import Export
 from app.errors import UsageError
 from app.export import FOLDERS, default_path, export, held, steady
 from app.overlay import enlarged
+from app.playback import Playback
 from app.progress import Progress
 from app.scenery import PREDICTED_RGB, SEEN_RGB
+from app.table_export import write_npz
 from reconstruction.camera import Camera
 from tests.app.glb_file import GlbFile, issues
 from tests.synthetic_run import SIZE, Run, write_run
@@ -128,6 +132,20 @@ def test_npz_is_what_the_run_had(tmp_path: Path, which: str, request: pytest.Fix
         assert turned == pytest.approx(run.estimates[k].shape, abs=1e-6)
     else:
         assert np.isnan(values["camera_position"]).all()
+
+
+def test_npz_has_empty_rows_where_the_surface_was_lost(run: Run) -> None:
+    playback = Playback.load(run.path)
+    s, quaternion, visible = playback.s.copy(), playback.quaternion.copy(), playback.visible.copy()
+    s[3], quaternion[3], visible[3] = np.nan, np.nan, False
+    phases = [*playback.phases[:3], "lost", *playback.phases[4:]]
+    file = BytesIO()
+    write_npz(replace(playback, s=s, quaternion=quaternion, visible=visible, phases=phases), file, lambda: None)
+    with np.load(BytesIO(file.getvalue())) as stored:
+        assert stored["frames"].tolist() == list(range(FRAMES))
+        for key in ("S", "R", "s", "projection", "camera_R", "camera_position"):
+            assert [bool(np.isnan(row).all()) for row in stored[key]] == [k == 3 for k in range(FRAMES)], key
+        assert not stored["visible"][3].any()
 
 
 def read(path: Path) -> list[dict[str, str]]:
