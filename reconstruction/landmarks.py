@@ -29,10 +29,20 @@ def leading_eigenpairs(rest: Array, edges: Indices, count: int, metric: str) -> 
     Raises:
         ReconstructionError: the mesh with edges (n, 2) falls into pieces, with the manhattan metric.
     """
-    chosen = farthest_points(rest.T, max(LANDMARKS, PER_MODE * count))
+    chosen = landmarks(rest, count)
+    return eigenpairs_of(distances_to(chosen, rest, edges, metric), chosen, count)
+
+
+def landmarks(rest: Array, modes: int) -> Indices:
+    """Well-spread points (m,) of the rest shape (3, p), enough for so many modes."""
+    return farthest_points(rest.T, max(LANDMARKS, PER_MODE * modes))
+
+
+def distances_to(chosen: Indices, rest: Array, edges: Indices, metric: str) -> Array:
+    """D[:, L] (p, m): distances of the points of the rest shape (3, p) to the landmarks (m,)."""
     if metric == "euclidean":
-        return eigenpairs_of(cdist(rest.T, rest[:, chosen].T), chosen, count)
-    return eigenpairs_of(distances.manhattan(rest, edges, chosen), chosen, count)
+        return np.asarray(cdist(rest.T, rest[:, chosen].T))
+    return distances.manhattan(rest, edges, chosen)
 
 
 def eigenpairs_of(to_landmarks: Array, chosen: Indices, count: int) -> tuple[Array, Array]:
