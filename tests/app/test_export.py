@@ -15,6 +15,7 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
+from app import demo
 from app.config_export import Export
 from app.errors import UsageError
 from app.export import FOLDERS, default_path, export, held, steady
@@ -321,10 +322,18 @@ def test_the_command_line(tmp_path: Path, run: Run) -> None:
     assert (tmp_path / "sheet.glb").is_file()
 
 
-def test_a_real_run_agrees_with_its_own_shapes(tmp_path: Path, shared_data: Path) -> None:
-    recording, shapes = tmp_path / "paper.rrd", tmp_path / "shapes.npz"
-    roi = ("--roi", "195", "95", "325", "265", "--frames", "0:30", "--points", "200")
-    done = modeshape("run", shared_data / "kinect_paper.mp4", *roi, "--out", recording, "--shapes-out", shapes)
+@pytest.mark.parametrize(
+    ("video", "roi"),
+    [("kinect_paper.mp4", (195, 95, 325, 265)), ("talking_face.mp4", (115, 70, 130, 160)), (None, None)],
+    ids=["paper", "face", "demo"],
+)
+def test_a_real_run_agrees_with_its_own_shapes(
+    tmp_path: Path, request: pytest.FixtureRequest, video: str | None, roi: tuple[int, ...] | None
+) -> None:
+    recording, shapes = tmp_path / "real.rrd", tmp_path / "shapes.npz"
+    source = demo.sample().video if video is None else request.getfixturevalue("shared_data") / video
+    options = ("--roi", *map(str, roi or demo.sample().roi), "--frames", "0:30", "--points", "200")
+    done = modeshape("run", source, *options, "--out", recording, "--shapes-out", shapes)
     assert done.returncode == 0, done.stderr
     with np.load(shapes) as stored:
         truth = dict(stored)
