@@ -54,6 +54,8 @@ class Output:
     """Save the tracked points as .npz: W (F, 2, P), visible (F, P)."""
     shapes_out: Path | None = None
     """Save the shapes as .npz: S (F, 3, P) camera axes, R, s, t, Lambda, faces, visible."""
+    split_minutes: float | None = None
+    """Start another recording after so many minutes of video: NAME.rrd, NAME-part2.rrd, … Each is complete in itself."""
     image: Literal["jpeg", "video", "none"] = "jpeg"
     """How frames are stored in the recording: each as JPEG, the video file as it is, or not at all."""
     view: bool = False
@@ -62,6 +64,13 @@ class Output:
     """Address (host:port) of a running viewer to watch live in."""
     json: bool = False
     """Print the summary as JSON on stdout."""
+
+    def __post_init__(self) -> None:
+        if self.split_minutes is not None:
+            if not self.split_minutes > 0:
+                raise UsageError(f"--split-minutes {self.split_minutes} is no time: give more than 0")
+            if self.image == "video":
+                raise UsageError("--split-minutes does not go with --image video: use --image jpeg")
 
 
 @dataclass(frozen=True)
@@ -76,6 +85,10 @@ class Source:
     """Picture of the video's size, white where the surface is in the first frame."""
     frames: Annotated[str, tyro.conf.arg(metavar="A:B")] = ":"
     """Frames A to B-1 of the source."""
+    duration: float | None = None
+    """Stop so many seconds after the first frame."""
+    drop_late: bool = False
+    """Of a camera or stream, take always the newest frame, and leave out those there is no time for."""
     points: int = 800
     """Most points tracked."""
     rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|PATH")] = "auto"
@@ -87,6 +100,8 @@ class Source:
     def __post_init__(self) -> None:
         if self.points < 4:
             raise UsageError(f"--points {self.points} is too few: give 4 and more")
+        if self.duration is not None and not self.duration > 0:
+            raise UsageError(f"--duration {self.duration} is no time: give seconds, more than 0")
 
     @property
     def frame_range(self) -> tuple[int, int | None]:
@@ -101,6 +116,7 @@ class Run(Source):
     Examples:
       modeshape run paper.mp4 --roi 195 95 325 265
       modeshape run 0 --view                        # the first camera, live
+      modeshape run http://camera.local/mjpeg --drop-late --split-minutes 30
       modeshape run frames/img%04d.png --mask sheet.png --frames 10:200
       modeshape run sheet.mp4 --focal 900 --shapes-out shapes.npz --json
       modeshape run sheet.mp4 --texture logo.png --place 250 160 90 60 --view

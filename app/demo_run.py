@@ -4,8 +4,9 @@ from pathlib import Path
 
 from app.config import Demo, Output, Run, Words
 from app.demo import sample
+from app.parts import RECORDINGS
 from app.progress import Progress
-from app.session import RECORDINGS, Session
+from app.session import Session
 
 
 def demo(config: Demo) -> Words:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain, count
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from typing import Literal, cast
@@ -18,12 +18,13 @@ from app.config import Run, Words, as_words
 from app.errors import UsageError
 from app.interrupts import completed
 from app.mesh_file import rest_of_surface
-from app.modes_behind import ModesBehind
 from app.observer import Followed, Observer
+from app.parts import RECORDINGS, Parts, free_name
 from app.progress import Progress
 from app.recording import Recording
 from app.results import Collected, check_free, save_shapes, score_words
 from app.stopwatch import Stopwatch
+from app.tally import Tally
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.model import ShapeEstimate
@@ -34,9 +35,6 @@ from tracking.klt import Observation
 from tracking.region import region_mask
 from tracking.tracks import Tracks, Truth
 from tracking.video import Frame, Video
-
-RECORDINGS = Path("recordings")
-MODES_WAIT_S = 5.0  # a run of a few frames waits so long, at its end, for the figure of its modes
 
 
 class Session:
@@ -63,15 +61,11 @@ class Session:
         self._collected = Collected(output.shapes_out is not None, truth_frames)
         self._watch = Stopwatch()
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
-        self._frames = 0
-        self._seen_sum = self._seen_last = 0.0  # shares of the points
-        self._lost: list[int] = []  # frames without the surface
-        self._losses = self._recoveries = 0
+        self._tally = Tally(listing=output.shapes_out is not None)
         self._tracks: list[Observation] = []
-        self._recording_path: Path | None = None
-        self._modes: ModesBehind | None = None
+        self._heard: list[str] = []  # from the source, to be told with the next frame
         self._interrupted = self._modelled = False
-        self._elapsed_s = 0.0
+        self._started = self._elapsed_s = 0.0
 
     def run(self) -> Words:
         """Process the whole source; an interrupt ends it early, with everything so far kept.
@@ -83,7 +77,10 @@ class Session:
             UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
         """
         config = self._config
-        with threadpool_limits(1), Video(config.source, *config.frame_range) as video:
+        video = Video(
+            config.source, *config.frame_range, duration_s=config.duration, drop_late=config.drop_late, say=self._hear
+        )
+        with threadpool_limits(1), video:
             frames = iter(video)
             first, second = next(frames), next(frames, None)
             if second is None:
@@ -94,21 +91,9 @@ class Session:
             path = config.output.out
             if path is None and self._observer is None:
                 path = free_name(RECORDINGS, config.source)
-            with (
-                Recording(
-                    path,
-                    configuration=as_words(config) | {"focal_px": self._focal_px},
-                    size=video.size,
-                    connect=config.output.connect,
-                    view=config.output.view,
-                    image=config.output.image,
-                    video=Path(config.source),
-                    overwrite=config.output.overwrite,
-                ) as recording,
-                self._progress,
-            ):
-                self._recording, self._recording_path = recording, path
-                started = perf_counter()
+            split_s = None if config.output.split_minutes is None else 60.0 * config.output.split_minutes
+            with Parts(path, self._record, self._summary, split_s) as self._recording, self._progress:
+                self._started = perf_counter()
                 try:
                     self._progress.expect(video.frame_count)
                     self._loop(first, chain([second], frames))
@@ -116,13 +101,29 @@ class Session:
                     self._interrupted = True
                 self._finish()
                 self._followed.end()
-                self._elapsed_s = perf_counter() - started
-                summary = self._summary()
-                recording.summary(summary)
-                if self._modes and (figure := self._modes.figure(MODES_WAIT_S)):
-                    recording.modes(figure)
+                self._elapsed_s = perf_counter() - self._started
+                self._recording.finish()
         self._save()
-        return summary
+        return self._summary()
+
+    def _record(self, path: Path | None) -> Recording:
+        """A recording of this run, or of a part of it."""
+        config, output = self._config, self._config.output
+        return Recording(
+            path,
+            configuration=as_words(config) | {"focal_px": self._focal_px},
+            size=self._size,
+            connect=output.connect,
+            view=output.view,
+            image=output.image,
+            video=Path(config.source),
+            overwrite=output.overwrite,
+        )
+
+    def _hear(self, text: str) -> None:
+        """What the source has to say, in its own thread."""
+        self._progress.say(text)
+        self._heard.append(text)
 
     def _start(self, first: Frame, video: Video) -> None:
         """Corners of the first frame, and the camera they are seen by."""
@@ -148,7 +149,7 @@ class Session:
             given, inside = rest_of_surface(Path(config.rest_shape), points_px, camera)
             points_px = points_px[inside]
             self._reconstruction = Reconstruction(camera, settings, given)
-        self._first, self._points_px, self._fps = first, points_px, video.fps
+        self._first, self._points_px, self._fps, self._size = first, points_px, video.fps, video.size
 
     def _loop(self, first: Frame, frames: Iterator[Frame]) -> None:
         with self._watch.time("track"):
@@ -157,7 +158,7 @@ class Session:
         frame: Frame | None = first
         while frame is not None:
             with completed():
-                if self._frames:
+                if self._tally.frames:
                     with self._watch.time("track"):
                         guarded = tracker.track(frame.image, self._reconstruction.predict())
                 self._tell(frame, guarded)
@@ -166,28 +167,28 @@ class Session:
                 frame = next(frames, None)
 
     def _tell(self, frame: Frame, guarded: Guarded) -> None:
-        """Say that the surface was lost or found; once found, nothing ties it to where it was."""
+        """Say what the source said, and that the surface was lost or found; then nothing ties it to where it was."""
+        while self._heard:
+            self._recording.event(frame.index, frame.time_s, self._heard.pop(0), "WARN")
         if guarded.change is Change.NONE:
             return
         if guarded.change is Change.LOST:
-            self._losses += 1
+            self._tally.losses += 1
         else:
-            self._recoveries += 1
+            self._tally.recoveries += 1
             self._reconstruction.restart()
         text = f"{guarded.change.value} at frame {frame.index}: {guarded.reason}"
         self._recording.event(frame.index, frame.time_s, text, "WARN")
         self._progress.say(text)
 
     def _step(self, frame: Frame, observation: Observation, *, lost: bool) -> None:
-        self._seen_last = float(observation.visible.mean())
-        self._seen_sum += self._seen_last
+        self._tally.add(frame.index, observation, lost=lost)
         if self._config.output.tracks_out:
             self._tracks.append(observation)
         self._followed.add(frame, observation)
         phase = Phase.LOST if lost else self._reconstruction.phase
         estimates: list[ShapeEstimate] = []
         if lost:  # no shape is better than a wrong one
-            self._lost.append(frame.index)
             if self._modelled:
                 self._followed.end()
         else:
@@ -199,7 +200,6 @@ class Session:
             self._settle(estimates)
         self._recording.timing(frame.index, frame.time_s, self._watch.now)
         self._watch.now.clear()
-        self._frames += 1
         self._progress.advance(phase.value if lost else self._reconstruction.phase.value, self._collected.last_rms_px)
 
     def _settle(self, estimates: list[ShapeEstimate]) -> None:
@@ -237,19 +237,9 @@ class Session:
         if self._picture is not None:
             laid = Laid(self._config.place, self._config.opacity)
             first = painted(first, self._points_px, model, self._picture, laid)
-        self._recording.rest(
-            model.basis,
-            model.mesh.faces,
-            model.mesh.edges,
-            model.camera,
-            texture_bgr=first,
-            texture_px=self._points_px,
-        )
+        self._recording.model(model, first, self._points_px, self._config.model.metric)
         if self._observer:
             self._observer.begin(self._first, self._points_px, model, self._fps)
-        if self._recording_path:
-            metric = self._config.model.metric
-            self._modes = ModesBehind(model.basis, model.mesh, metric, self._recording_path.stem)
         self._modelled = True
 
     @property
@@ -259,10 +249,11 @@ class Session:
         return camera.focal_px if camera.perspective else None
 
     def _summary(self) -> Words:
-        config, rest, frames = self._config, self._reconstruction.rest, max(self._frames, 1)
+        config, rest, frames = self._config, self._reconstruction.rest, self._tally.frames
+        elapsed_s = self._elapsed_s or perf_counter() - self._started
         words: Words = {
             "source": config.source,
-            "frames": self._frames,
+            "frames": frames,
             "interrupted": self._interrupted,
             "points": len(self._points_px),
             "rest_shape": rest.kind if rest else None,
@@ -270,19 +261,15 @@ class Session:
             "bootstrap_frames": self._reconstruction.bootstrap_frames,
             "deformation": self._reconstruction.deformation,
             "focal_px": self._focal_px,
-            "visible_share": self._seen_sum / frames if self._frames else None,
-            "visible_share_last": self._seen_last if self._frames else None,
-            "losses": self._losses,
-            "recoveries": self._recoveries,
-            "frames_lost": len(self._lost),
+            **self._tally.words,
             "reprojection_rms_px": self._collected.reprojection_rms_px,
-            "fps": self._frames / self._elapsed_s if self._elapsed_s else None,
-            "stage_ms": {stage: total / frames for stage, total in self._watch.total.items()},
+            "fps": frames / elapsed_s,
+            "stage_ms": {stage: total / max(frames, 1) for stage, total in self._watch.total.items()},
         }
         if self._truth and rest:
             rest_points, mesh = rest.motion.shape, self._reconstruction.model.mesh
             words |= score_words(self._collected.score_against(self._truth, rest_points, mesh))
-        return words | ({"recording": str(self._recording_path)} if self._recording_path else {})
+        return words | self._recording.words
 
     def _save(self) -> None:
         output = self._config.output
@@ -292,12 +279,4 @@ class Session:
             camera = self._reconstruction.camera
             Tracks(W, visible, K=camera.K if camera.perspective else None).save(output.tracks_out)
         if output.shapes_out and self._collected.estimates:
-            save_shapes(output.shapes_out, self._collected.estimates, self._reconstruction.model, self._lost)
-
-
-def free_name(folder: Path, source: str) -> Path:
-    """A recording's path named after its source that does not exist yet: NAME.rrd, NAME-2.rrd, …"""
-    stem = Path(source.split("?")[0]).stem.replace("%", "") or "video"
-    stem = f"camera{stem}" if source.isdigit() else stem
-    numbered = (folder / f"{stem}{f'-{n}' if n > 1 else ''}.rrd" for n in count(1))
-    return next(path for path in numbered if not path.exists())
+            save_shapes(output.shapes_out, self._collected.estimates, self._reconstruction.model, self._tally.lost)

@@ -1,28 +1,21 @@
 """Frames with true time stamps from a file, an image pattern, a camera or a URL."""
 
-import os
-import re
 import shlex
 import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from queue import Empty, Full, Queue
+from time import monotonic
 from types import TracebackType
-from typing import Protocol, Self, cast
-
-# FFmpeg reads its level when the first file is opened; both would write past us to the terminal.
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
+from typing import Self, cast
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from tracking import TrackingError
-from tracking.images import ImageFiles
-
-cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # in case cv2 was imported before us
+from tracking.capture import Reconnecting, Say, announced_frames, as_bgr, is_camera, open_capture
 
 Image = NDArray[np.uint8]
 
@@ -47,15 +40,6 @@ class Frame:
     image: Image
 
 
-class _Capture(Protocol):
-    """What `Video` needs of a cv2.VideoCapture."""
-
-    def grab(self) -> bool: ...
-    def retrieve(self) -> tuple[bool, Image]: ...
-    def get(self, propId: int, /) -> float: ...
-    def release(self) -> None: ...
-
-
 class Video:
     """An iterator of `Frame` over a video; a context manager that stops its decoding thread.
 
@@ -65,8 +49,13 @@ class Video:
         source: a file, a printf pattern of images ("img%04d.png"), the index of a camera ("0") or a URL.
         first: index of the first frame delivered.
         stop: index of the first frame not delivered any more; None reads to the end.
+        duration_s: so long after the first frame the video ends; None for no limit.
+        drop_late: of a live source, deliver always the newest frame and drop those nobody had time for.
+        say: told in words when a stream breaks and resumes; called in another thread.
 
     Attributes:
+        live: whether frames come when they happen: a camera, or a stream without end. Their time stamps are
+            those of their arrival, from 0.
         size: (width, height) in px.
         frame_count: announced number of frames that will be delivered, a hint only: containers lie, and
             None where the source does not say (live sources).
@@ -76,20 +65,35 @@ class Video:
         TrackingError: the source is missing, cannot be decoded, or has no frame in the asked range.
     """
 
-    def __init__(self, source: str, first: int = 0, stop: int | None = None) -> None:
+    def __init__(
+        self,
+        source: str,
+        first: int = 0,
+        stop: int | None = None,
+        *,
+        duration_s: float | None = None,
+        drop_late: bool = False,
+        say: Say = lambda _: None,
+    ) -> None:
         if first < 0 or (stop is not None and stop <= first):
             raise TrackingError(
                 f"no frame in the range {first}:{'' if stop is None else stop}; ask for A:B with 0 <= A < B"
             )
         self.source = source
-        self._stop = stop
-        self._capture = _open(source)
+        self._stop, self._duration_s = stop, duration_s
+        self._closing = threading.Event()
+        self._capture = open_capture(source, self._closing, say)
+        self.live = is_camera(source) or isinstance(self._capture, Reconnecting)
+        if drop_late and not self.live:
+            self._capture.release()
+            raise TrackingError(f"{source} is no camera or stream: frames of a file are never late; leave --drop-late out")
+        self._newest_only = drop_late
+        self._began = monotonic()
         self._index = 0  # of the next frame grabbed
         self._time_s = -np.inf
         fps = self._capture.get(cv2.CAP_PROP_FPS)
         self.fps = fps if 0.5 < fps < 1000.0 else DEFAULT_FPS
-        announced = self._capture.get(cv2.CAP_PROP_FRAME_COUNT)
-        self._announced = int(announced) if 0 < announced < 2**31 else None
+        self._announced = announced_frames(self._capture)
         try:
             self._skip_to(first)
             frame = self._read()
@@ -104,8 +108,9 @@ class Video:
         if self._announced is not None:
             end = self._announced if stop is None else min(stop, self._announced)
             self.frame_count = max(end - frame.index, 1)
-        self._queue: Queue[Frame | BaseException | None] = Queue(DECODE_AHEAD)
-        self._closing = threading.Event()
+            if duration_s is not None:
+                self.frame_count = min(self.frame_count, int(duration_s * self.fps) + 1)
+        self._queue: Queue[Frame | BaseException | None] = Queue(1 if drop_late else DECODE_AHEAD)
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> Self:
@@ -122,6 +127,8 @@ class Video:
             try:
                 item = self._queue.get(timeout=0.1)
             except Empty:
+                if self.live and self._duration_s is not None and monotonic() - self._began > self._duration_s:
+                    return  # a broken stream brings no frame that would end it
                 continue
             if item is None:
                 self._put(None)  # a second iteration ends at once, too
@@ -148,12 +155,15 @@ class Video:
             self._put(error)
 
     def _put(self, item: Frame | BaseException | None) -> bool:
+        newest = self._newest_only and isinstance(item, Frame)
         while not self._closing.is_set():
             try:
-                self._queue.put(item, timeout=0.1)
+                self._queue.put(item, timeout=0.0 if newest else 0.1)
                 return True
             except Full:
-                continue
+                if newest:
+                    with suppress(Empty):
+                        self._queue.get_nowait()
         return False
 
     def _skip_to(self, first: int) -> None:
@@ -182,16 +192,24 @@ class Video:
                 return None
             ok, image = self._capture.retrieve()
             if ok and image is not None and image.size:
-                return self._frame(_as_bgr(image))
+                frame = self._frame(as_bgr(image))
+                return frame if self._in_time(frame) else None
             self._index += 1
         return None
+
+    def _in_time(self, frame: Frame) -> bool:
+        return (
+            self._duration_s is None or not hasattr(self, "_first") or frame.time_s - self._first.time_s < self._duration_s
+        )
 
     def _frame(self, image: Image) -> Frame:
         if hasattr(self, "size") and (image.shape[1], image.shape[0]) != self.size:
             image = cast(Image, cv2.resize(image, self.size))  # a stream may change its resolution
         time_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
+        if self.live:
+            time_s = monotonic() - self._began
         if not np.isfinite(time_s) or time_s <= self._time_s or (time_s <= 0.0 and self._index > 0):
-            time_s = max(self._index / self.fps, self._time_s + 1e-3)
+            time_s = max(0.0 if self.live else self._index / self.fps, self._time_s + 1e-3)
         self._time_s = time_s
         frame = Frame(self._index, time_s, image)
         self._index += 1
@@ -209,37 +227,3 @@ class Video:
             )
         named = f" (codec {codec})" if codec.isprintable() and codec else ""
         return TrackingError(f"{self.source} has no frame that can be decoded{named}; convert it to H.264 with ffmpeg")
-
-
-def _open(source: str) -> _Capture:
-    if re.fullmatch(r"\d+", source):
-        camera = cv2.VideoCapture(int(source))
-        if not camera.isOpened():
-            raise TrackingError(f"camera {source} cannot be opened; is it connected, and free of other programs?")
-        return cast(_Capture, camera)
-    if "://" not in source:
-        path = Path(source)
-        if re.search(r"%0?\d*d", source) and not path.exists():
-            return ImageFiles(source)
-        if path.is_dir():
-            raise TrackingError(f"{source} is a folder; give the images in it by a pattern, as {source}/img%04d.png")
-        if not path.is_file():
-            raise TrackingError(f"no video file {source}; check the path")
-        if not os.access(path, os.R_OK):
-            raise TrackingError(f"{source} cannot be read: permission denied")
-    capture = cv2.VideoCapture(source)
-    if not capture.isOpened():
-        remedy = "check the address" if "://" in source else "it is not a video, or it is damaged or cut off"
-        raise TrackingError(f"{source} cannot be decoded; {remedy}")
-    return cast(_Capture, capture)
-
-
-def _as_bgr(image: Image) -> Image:
-    """The picture as (H, W, 3) uint8, whatever depth and channels the decoder gave."""
-    if image.dtype != np.uint8:
-        image = cast(Image, cv2.convertScaleAbs(image, alpha=1.0 / 256.0 if image.dtype == np.uint16 else 1.0))
-    if image.ndim == 2 or image.shape[2] == 1:
-        return cast(Image, cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))
-    if image.shape[2] == 4:
-        return cast(Image, cv2.cvtColor(image, cv2.COLOR_BGRA2BGR))
-    return image

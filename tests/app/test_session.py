@@ -7,8 +7,9 @@ import pytest
 
 from app.config import Model, Output, Run
 from app.errors import UsageError
+from app.parts import free_name
 from app.progress import Progress
-from app.session import Session, free_name
+from app.session import Session
 from reconstruction import ReconstructionError
 from tests.synthetic_run import verify
 

@@ -1,0 +1,120 @@
+"""A recording in parts, each complete in itself, for runs of hours and days."""
+
+from collections.abc import Callable, Mapping
+from itertools import count
+from pathlib import Path
+from types import TracebackType
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.modes_behind import ModesBehind
+from app.recording import Recording
+from reconstruction.model import Model, ShapeEstimate
+from reconstruction.modes import Metric
+from tracking.klt import Observation
+from tracking.video import Frame
+
+RECORDINGS = Path("recordings")
+MODES_WAIT_S = 5.0  # a run of a few frames waits so long, at its end, for the figure of its modes
+
+
+class Parts:
+    """Writes like a `Recording`, and goes on in another file now and then; a context manager.
+
+    Args:
+        path: of the first part; the others are numbered. None writes none.
+        record: opens a recording of that path.
+        summary: what is known of the run by now, told at the end of each part.
+        split_s: seconds of video in a part; None for one part only.
+
+    Attributes:
+        paths: of the parts so far.
+    """
+
+    def __init__(
+        self,
+        path: Path | None,
+        record: Callable[[Path | None], Recording],
+        summary: Callable[[], Mapping[str, object]],
+        split_s: float | None = None,
+    ) -> None:
+        self.path, self._record, self._summary, self._split_s = path, record, summary, split_s
+        self._recording = record(path)
+        self._parts, self._last = 1, path
+        self._began_s: float | None = None
+        self._model: tuple[Model, NDArray[np.uint8], NDArray[np.float64]] | None = None
+        self._modes: ModesBehind | None = None
+
+    def observe(self, frame: Frame, observation: Observation, *, phase: str) -> None:
+        """A frame, its tracked points and the run's phase; from here on in another file, if it is time."""
+        if self._began_s is None:
+            self._began_s = frame.time_s
+        if self._split_s is not None and self._model is not None and frame.time_s - self._began_s >= self._split_s:
+            self._began_s = frame.time_s
+            self._next()
+        self._recording.observe(frame, observation, phase=phase)
+
+    def model(self, model: Model, texture_bgr: NDArray[np.uint8], texture_px: NDArray[np.float64], metric: Metric) -> None:
+        """The model, once it is known; `texture_px` (p, 2) are its vertices' pixels in `texture_bgr`."""
+        self._model = model, texture_bgr, texture_px
+        self._tell_model()
+        if self.path is not None:
+            self._modes = ModesBehind(model.basis, model.mesh, metric, self.path.stem)
+
+    def estimate(self, index: int, time_s: float, estimate: ShapeEstimate) -> None:
+        """One frame's shape and pose."""
+        self._recording.estimate(index, time_s, estimate)
+
+    def timing(self, index: int, time_s: float, stage_ms: Mapping[str, float]) -> None:
+        """Milliseconds that each stage took for one frame."""
+        self._recording.timing(index, time_s, stage_ms)
+
+    def event(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:
+        """Something that happened, in words."""
+        self._recording.event(index, time_s, text, level)
+
+    def finish(self) -> None:
+        """The run is over: the summary, and the figure of the modes if it is there in time."""
+        self._recording.summary(self._summary())
+        if self._modes and (figure := self._modes.figure(MODES_WAIT_S)):
+            self._recording.modes(figure)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._recording.__exit__(kind, error, trace)
+
+    @property
+    def words(self) -> dict[str, object]:
+        """Where it is, for the summary."""
+        if self.path is None:
+            return {}
+        parts = {"parts": self._parts, "last_part": str(self._last)} if self._parts > 1 else {}
+        return {"recording": str(self.path)} | parts
+
+    def _next(self) -> None:
+        assert self.path is not None
+        self._recording.summary(self._summary())
+        self._recording.close()
+        self._parts += 1
+        self._last = free_name(self.path.parent, f"{self.path.stem}-part{self._parts}.rrd")
+        self._recording = self._record(self._last)
+        self._tell_model()
+
+    def _tell_model(self) -> None:
+        assert self._model is not None
+        model, image, points_px = self._model
+        self._recording.rest(
+            model.basis, model.mesh.faces, model.mesh.edges, model.camera, texture_bgr=image, texture_px=points_px
+        )
+
+
+def free_name(folder: Path, source: str) -> Path:
+    """A recording's path named after its source that does not exist yet: NAME.rrd, NAME-2.rrd, …"""
+    stem = Path(source.split("?")[0]).stem.replace("%", "") or "video"
+    stem = f"camera{stem}" if source.isdigit() else stem
+    numbered = (folder / f"{stem}{f'-{n}' if n > 1 else ''}.rrd" for n in count(1))
+    return next(path for path in numbered if not path.exists())

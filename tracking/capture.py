@@ -1,0 +1,143 @@
+"""Opening what frames come from: a file, an image pattern, a camera, or a stream that may break."""
+
+import os
+import re
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from time import monotonic
+from typing import Protocol, cast
+
+# FFmpeg reads its level when the first file is opened; both would write past us to the terminal.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
+os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking import TrackingError
+from tracking.images import ImageFiles
+
+cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # in case cv2 was imported before us
+
+Image = NDArray[np.uint8]
+Say = Callable[[str], None]
+
+PATIENCE_S = 60.0  # a broken stream is waited for
+RETRY_S = 0.5  # between two attempts
+TIMEOUT_MS = 5000  # a server that says nothing for so long is gone
+
+
+class Capture(Protocol):
+    """What is needed of a cv2.VideoCapture."""
+
+    def grab(self) -> bool: ...  # noqa: D102
+    def retrieve(self) -> tuple[bool, Image]: ...  # noqa: D102
+    def get(self, propId: int, /) -> float: ...  # noqa: D102
+    def release(self) -> None: ...  # noqa: D102
+
+
+class Reconnecting:
+    """A stream without end that is connected to again when it breaks; reads like a cv2.VideoCapture.
+
+    Args:
+        url: its address.
+        capture: the stream, open.
+        closing: set when nobody wants it any more.
+        say: told in words when it breaks and resumes; called in the thread that grabs.
+    """
+
+    def __init__(self, url: str, capture: Capture, closing: threading.Event, say: Say) -> None:
+        self._url, self._capture, self._closing, self._say = url, capture, closing, say
+        self._began = False
+
+    def grab(self) -> bool:
+        """Go to the next picture; False if the stream never gave one, or stays broken."""
+        if self._capture.grab():
+            self._began = True
+            return True
+        if not self._began or self._closing.is_set():
+            return False
+        broken = monotonic()
+        self._say(f"{self._url} broke: connecting again")
+        while not self._closing.wait(RETRY_S) and monotonic() - broken < PATIENCE_S:
+            self._capture.release()
+            self._capture = open_url(self._url)
+            if self._capture.grab():
+                self._say(f"{self._url} resumed after {monotonic() - broken:.1f} s")
+                return True
+        if not self._closing.is_set():
+            self._say(f"{self._url} did not come back in {PATIENCE_S:.0f} s: ending")
+        return False
+
+    def retrieve(self) -> tuple[bool, Image]:
+        """Decode the picture gone to."""
+        return self._capture.retrieve()
+
+    def get(self, propId: int, /) -> float:
+        """A property of the stream as it is now."""
+        return self._capture.get(propId)
+
+    def release(self) -> None:
+        """Disconnect."""
+        self._capture.release()
+
+
+def open_capture(source: str, closing: threading.Event, say: Say) -> Capture:
+    """Open a source; `closing` and `say` as for `Reconnecting`.
+
+    Raises:
+        TrackingError: it is missing or cannot be decoded.
+    """
+    if is_camera(source):
+        camera = cv2.VideoCapture(int(source))
+        if not camera.isOpened():
+            raise TrackingError(f"camera {source} cannot be opened; is it connected, and free of other programs?")
+        return cast(Capture, camera)
+    if "://" in source:
+        capture = open_url(source)
+        if not cast(cv2.VideoCapture, capture).isOpened():
+            raise TrackingError(f"{source} cannot be decoded; check the address")
+        return capture if announced_frames(capture) else Reconnecting(source, capture, closing, say)
+    path = Path(source)
+    if re.search(r"%0?\d*d", source) and not path.exists():
+        return ImageFiles(source)
+    if path.is_dir():
+        raise TrackingError(f"{source} is a folder; give the images in it by a pattern, as {source}/img%04d.png")
+    if not path.is_file():
+        raise TrackingError(f"no video file {source}; check the path")
+    if not os.access(path, os.R_OK):
+        raise TrackingError(f"{source} cannot be read: permission denied")
+    file = cv2.VideoCapture(source)
+    if not file.isOpened():
+        raise TrackingError(f"{source} cannot be decoded; it is not a video, or it is damaged or cut off")
+    return cast(Capture, file)
+
+
+def is_camera(source: str) -> bool:
+    """Whether a source is the index of a camera."""
+    return re.fullmatch(r"[0-9]{1,9}", source) is not None
+
+
+def open_url(url: str) -> Capture:
+    """A capture that gives up on a silent server; open or not."""
+    limits = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, TIMEOUT_MS, cv2.CAP_PROP_READ_TIMEOUT_MSEC, TIMEOUT_MS]
+    return cast(Capture, cv2.VideoCapture(url, cv2.CAP_FFMPEG, limits))
+
+
+def announced_frames(capture: Capture) -> int | None:
+    """The number of frames a source says it has; None where it does not say."""
+    announced = capture.get(cv2.CAP_PROP_FRAME_COUNT)
+    return int(announced) if 0 < announced < 2**31 else None
+
+
+def as_bgr(image: Image) -> Image:
+    """The picture as (H, W, 3) uint8, whatever depth and channels the decoder gave."""
+    if image.dtype != np.uint8:
+        image = cast(Image, cv2.convertScaleAbs(image, alpha=1.0 / 256.0 if image.dtype == np.uint16 else 1.0))
+    if image.ndim == 2 or image.shape[2] == 1:
+        return cast(Image, cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))
+    if image.shape[2] == 4:
+        return cast(Image, cv2.cvtColor(image, cv2.COLOR_BGRA2BGR))
+    return image
