@@ -11,7 +11,9 @@ from typing import Annotated, NoReturn
 import tyro
 
 from app.config import Demo, Evaluate, Review, Run
+from app.config_batch import Batch
 from app.config_export import Export, Modes
+from app.config_reproduce import Reproduce
 from app.config_retexture import Retexture
 from app.errors import UsageError
 
@@ -22,7 +24,9 @@ Command = (
     | Annotated[Review, tyro.conf.subcommand("review")]
     | Annotated[Retexture, tyro.conf.subcommand("retexture")]
     | Annotated[Export, tyro.conf.subcommand("export")]
+    | Annotated[Batch, tyro.conf.subcommand("batch")]
     | Annotated[Modes, tyro.conf.subcommand("modes")]
+    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
 )
 
 DESCRIPTION = """One ordinary video of a deforming surface becomes a moving 3-D mesh, live.
@@ -46,7 +50,7 @@ def main() -> NoReturn:
         sys.exit(INTERRUPTED)
 
 
-def parse() -> Run | Evaluate | Demo | Review | Retexture | Export | Modes:
+def parse() -> Run | Evaluate | Demo | Review | Retexture | Export | Modes | Batch | Reproduce:
     """The command asked for; a mistake is told in one line instead of a panel."""
     complaint = io.StringIO()
     try:
@@ -67,7 +71,7 @@ def in_one_line(panel: str) -> str:
     return f"{what}; see {where.group() if where else 'modeshape --help'}"
 
 
-def run(command: Run | Evaluate | Demo | Review | Retexture | Export | Modes) -> int:
+def run(command: Run | Evaluate | Demo | Review | Retexture | Export | Modes | Batch | Reproduce) -> int:
     """Carry out a command; returns the exit code."""
     from app.progress import Progress
     from app.summary import as_json, as_table
@@ -78,6 +82,10 @@ def run(command: Run | Evaluate | Demo | Review | Retexture | Export | Modes) ->
 
         review(command, Progress())
         return 0
+    if isinstance(command, Batch):
+        from app.batch import batch
+
+        return batch(command, Progress("starting"))
     if isinstance(command, Evaluate):
         from app.evaluate import evaluate
 
@@ -98,6 +106,11 @@ def run(command: Run | Evaluate | Demo | Review | Retexture | Export | Modes) ->
         from app.modes import modes
 
         words, printed_as_json = modes(command, Progress("reading")), command.json
+    elif isinstance(command, Reproduce):
+        from app.reproduce.command import reproduce, summary
+
+        words, printed_as_json = reproduce(command), command.json
+        words = words if printed_as_json else summary(words)
     else:
         from app.session import Session
 

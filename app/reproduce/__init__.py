@@ -1,0 +1,1 @@
+"""`modeshape reproduce`: the paper's experiments on the data at hand."""

@@ -1,0 +1,17 @@
+"""All experiments, in the order of the report."""
+
+from app.reproduce import accuracy, basis_time, footage, missing, mode_counts, mode_shapes, organ_run, peers
+from app.reproduce.experiment import Experiment
+
+CATALOG: tuple[Experiment, ...] = (
+    accuracy.EXPERIMENT,
+    peers.EXPERIMENT,
+    mode_counts.EXPERIMENT,
+    missing.EXPERIMENT,
+    basis_time.EXPERIMENT,
+    mode_shapes.EXPERIMENT,
+    organ_run.EXPERIMENT,
+    footage.SAMPLE,
+    footage.PAPER,
+    footage.TALKING_FACE,
+)
