@@ -11,6 +11,7 @@ from app.measures import Reviewed
 SIDES = ("left", "right")
 COLORS = (((90, 170, 255), (160, 205, 255)), ((255, 140, 60), (255, 200, 160)))  # strong, pale
 BACKGROUND = (24, 26, 32)
+SLOW_MS = 100.0  # the end of the bootstrap takes far longer, and would flatten the rest
 
 
 def show(reviewed: list[Reviewed], url: str) -> None:
@@ -53,9 +54,9 @@ def moved(chunk: Chunk, side: str) -> Chunk:
 def comparison(names: list[str]) -> rrb.Blueprint:
     """Meshes and videos of two recordings beside each other, their plots in the same views."""
     plots = [
-        ("Reprojection error, px", entities.ERROR),
-        ("Share of points seen", entities.VISIBLE),
-        ("Milliseconds per stage", entities.TIMING),
+        ("Reprojection error, px", entities.ERROR, None),
+        ("Share of points seen", entities.VISIBLE, None),
+        ("Milliseconds per stage", entities.TIMING, (0.0, SLOW_MS)),
     ]
     return rrb.Blueprint(
         rrb.Vertical(
@@ -68,8 +69,9 @@ def comparison(names: list[str]) -> rrb.Blueprint:
                         origin="/",
                         contents=[f"+ /{side}/{entity}/**" for side in SIDES],
                         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
+                        axis_y=rrb.ScalarAxis(range=span),
                     )
-                    for title, entity in plots
+                    for title, entity, span in plots
                 )
             ),
             row_shares=[3, 3, 2],
