@@ -6,10 +6,15 @@ BIN := .venv/bin
 OPENCV4 := 4.14.0.94
 BIN4 := .venv-opencv4/bin
 
-.PHONY: demo test test-slow test-opencv4 lint types pictures clean
+.PHONY: demo bench test test-slow test-opencv4 lint types pictures clean
 
 demo: .venv/ready
 	$(BIN)/modeshape demo
+
+# Ceres takes part where its package can be installed.
+bench: .venv/ready
+	-PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,bench]'
+	$(BIN)/modeshape bench --plot recordings/bench.png --overwrite --readme README.md
 
 test: .venv/ready
 	$(BIN)/python -m pytest

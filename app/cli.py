@@ -12,6 +12,7 @@ import tyro
 
 from app.config import Demo, Evaluate, Review, Run
 from app.config_batch import Batch
+from app.config_bench import Bench
 from app.config_export import Export, Modes
 from app.config_reproduce import Reproduce
 from app.config_retexture import Retexture
@@ -27,6 +28,7 @@ Command = (
     | Annotated[Batch, tyro.conf.subcommand("batch")]
     | Annotated[Modes, tyro.conf.subcommand("modes")]
     | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
 )
 
 DESCRIPTION = """One ordinary video of a deforming surface becomes a moving 3-D mesh, live.
@@ -50,7 +52,7 @@ def main() -> NoReturn:
         sys.exit(INTERRUPTED)
 
 
-def parse() -> Run | Evaluate | Demo | Review | Retexture | Export | Modes | Batch | Reproduce:
+def parse() -> Run | Evaluate | Demo | Review | Retexture | Export | Modes | Batch | Reproduce | Bench:
     """The command asked for; a mistake is told in one line instead of a panel."""
     complaint = io.StringIO()
     try:
@@ -71,7 +73,7 @@ def in_one_line(panel: str) -> str:
     return f"{what}; see {where.group() if where else 'modeshape --help'}"
 
 
-def run(command: Run | Evaluate | Demo | Review | Retexture | Export | Modes | Batch | Reproduce) -> int:
+def run(command: Run | Evaluate | Demo | Review | Retexture | Export | Modes | Batch | Reproduce | Bench) -> int:
     """Carry out a command; returns the exit code."""
     from app.progress import Progress
     from app.summary import as_json, as_table
@@ -86,6 +88,12 @@ def run(command: Run | Evaluate | Demo | Review | Retexture | Export | Modes | B
         from app.batch import batch
 
         return batch(command, Progress("starting"))
+    if isinstance(command, Bench):
+        from app.bench.command import bench, print_tables
+
+        words = bench(command, Progress("measuring"))
+        (as_json if command.json else print_tables)(words)
+        return 0
     if isinstance(command, Evaluate):
         from app.evaluate import evaluate
 

@@ -1,0 +1,134 @@
+"""Part 3 to 5: whole runs beside the bare OpenCV loop, their start, their frame times and their memory."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter, time
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+KINECT = ROOT.parent / "shared" / "data" / "kinect_paper.mp4"  # research data, not part of the program
+KINECT_ROI = (195, 95, 325, 265)
+POINTS = (800, 3_000)
+MANY_POINTS, MANY_FRAMES = 28_887, 12
+HELP = (sys.executable, "-c", "from app.cli import main; main()", "--help")
+HELP_REPEATS = 5
+QUICK_FRAMES = 120
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class WholeRun:
+    """A command's run, from its start to its end."""
+
+    video: str
+    points: int
+    frames: int
+    first_frame_s: float
+    """From the start of the command to the first frame done."""
+    loop_s: float
+    """From the first frame done to the last."""
+    bare_s: float
+    """The same frames decoded, made gray and followed by the same calls of Lucas-Kanade, nothing else."""
+    median_ms: float
+    p95_ms: float
+    peak_mb: float
+
+
+def whole_runs(*, quick: bool, say: Say) -> Iterator[WholeRun]:
+    """Of the sample and, where it is at hand, of the Kinect's paper."""
+    from app.demo import sample
+
+    say("rendering the sample video")
+    made = sample()
+    videos = [("demo", made.video, made.roi)]
+    if KINECT.exists():
+        videos = [("kinect_paper", KINECT, KINECT_ROI), *videos]
+    for name, video, roi in videos[: 1 if quick else None]:
+        for points in POINTS[: 1 if quick else None]:
+            say(f"run of {name}, {points} points")
+            yield whole_run(name, video, roi, points, QUICK_FRAMES if quick else None)
+
+
+def whole_run(name: str, video: Path, roi: tuple[int, int, int, int], points: int, frames: int | None) -> WholeRun:
+    """One run and its bare loop, in processes of their own."""
+    words = run_apart(video, roi, points, frames, ())
+    stamps = np.array(words["stamps"])
+    bare = child("app.bench.bare_loop", str(video), *map(str, roi), str(points), str(len(stamps)))
+    each_ms = 1e3 * np.diff(stamps)
+    return WholeRun(
+        name,
+        points,
+        len(stamps),
+        first_frame_s=stamps[0] - words["started"],
+        loop_s=float(stamps[-1] - stamps[0]),
+        bare_s=bare["seconds"],
+        median_ms=float(np.median(each_ms)),
+        p95_ms=float(np.percentile(each_ms, 95)),
+        peak_mb=words["peak_mb"],
+    )
+
+
+def many_points_mb(say: Say) -> float:
+    """Peak memory of a run with as many points as the paper's largest model, for a few frames."""
+    from app.demo import sample
+
+    say(f"run with {MANY_POINTS} points")
+    made = sample()
+    options = ("--rest-shape", "plane", "--bootstrap-frames", "2", "--image", "none")
+    words = run_apart(made.video, (0, 0, 640, 480), MANY_POINTS, MANY_FRAMES, options)
+    return float(words["peak_mb"])
+
+
+def run_apart(
+    video: Path, roi: tuple[int, int, int, int], points: int, frames: int | None, options: tuple[str, ...]
+) -> dict[str, float]:
+    """`modeshape run` in a process that notes when each frame is done."""
+    with TemporaryDirectory(prefix="modeshape-") as folder:
+        where = ["--roi", *map(str, roi), "--points", str(points), "--frames", f":{frames or ''}"]
+        arguments = ["run", str(video), *where, "--out", str(Path(folder, "run.rrd")), *options]
+        started = time()
+        return child("app.bench.timed_run", *arguments) | {"started": started}
+
+
+def help_s(say: Say) -> float:
+    """Seconds of `modeshape --help`, the least of several."""
+    say("modeshape --help")
+    least = np.inf
+    for _ in range(HELP_REPEATS):
+        started = perf_counter()
+        subprocess.run(HELP, cwd=ROOT, capture_output=True, check=True)
+        least = min(least, perf_counter() - started)
+    return least
+
+
+def child(module: str, *arguments: str) -> dict[str, float]:
+    """What a module of ours, run by itself, prints as JSON."""
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
+    done = subprocess.run(
+        [sys.executable, "-m", module, *arguments], env=environment, stdout=subprocess.PIPE, check=True, text=True
+    )
+    words: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return words
+
+
+def ratios(runs: list[WholeRun], help_seconds: float, many_mb: float | None) -> dict[str, float | None]:
+    """The figures that have targets."""
+    words: dict[str, float | None] = {}
+    for run in runs:
+        name = f"{run.video}_{run.points}"
+        words |= {
+            f"wall_over_bare_{name}": run.loop_s / run.bare_s,
+            f"fps_{name}": (run.frames - 1) / run.loop_s,
+            f"p95_over_median_{name}": run.p95_ms / run.median_ms,
+            f"peak_mb_{name}": run.peak_mb,
+        }
+    first = min(run.first_frame_s for run in runs if run.points == min(POINTS))
+    return words | {"help_s": help_seconds, "first_frame_s": first, f"peak_mb_{MANY_POINTS}": many_mb}

@@ -1,0 +1,36 @@
+"""`modeshape run` that notes when each frame is done: a process of its own, which prints JSON."""
+
+import json
+import sys
+from time import time
+
+from app.cli import parse
+
+
+def main() -> None:
+    """Run what the command line says."""
+    command = parse()
+    from app.bench.own_process import peak_mb
+    from app.config import Run
+    from app.progress import Progress
+    from app.session import Session
+
+    class Clock(Progress):
+        """Hears of every frame."""
+
+        stamps: list[float] = []  # noqa: RUF012 - one run per process
+
+        def advance(self, phase: str, error_px: float | None = None) -> None:
+            """One frame more."""
+            self.stamps.append(time())
+            super().advance(phase, error_px)
+
+    assert isinstance(command, Run)
+    clock = Clock()
+    Session(command, clock).run()
+    clock.stamps.append(time())  # with everything written
+    sys.stdout.write(json.dumps({"stamps": clock.stamps, "peak_mb": peak_mb()}) + "\n")
+
+
+if __name__ == "__main__":
+    main()
