@@ -120,11 +120,11 @@ def test_the_demo_is_retextured_as_if_it_were_printed(recording: Path) -> None:
         # Where the card has the page's own colour by chance, painting changes nothing.
         differs = covered & (np.abs(expected - remapped(image, places)).max(axis=-1) > 40)
         painted, free = painted + (differs & visible & ~still).sum(), free + (differs & visible).sum()
-    assert decibels(float(np.mean(squares))) > 27  # measured: 28.6
-    assert np.median([decibels(s) for s in squares]) > 28.5  # measured: 29.9
-    assert min(decibels(s) for s in squares) > 23  # measured: 24.0, beside the hand
-    assert in_front / hidden > 0.95  # measured: 0.98
-    assert painted / free > 0.95  # measured: 0.98
+    assert decibels(float(np.mean(squares))) > 28  # measured: 29.6
+    assert np.median([decibels(s) for s in squares]) > 29  # measured: 30.7
+    assert min(decibels(s) for s in squares) > 23  # measured: 24.6, beside the hand
+    assert in_front / hidden > 0.95  # measured: 0.986
+    assert painted / free > 0.95  # measured: 0.991
 
 
 def remapped(picture: NDArray[np.generic], places: NDArray[np.float32]) -> Floats:
