@@ -27,14 +27,15 @@ ROWS: dict[str, tuple[int, ...]] = {
     "general": (0, 1, 2),
     "inextensible": (0, 1, 2),
 }
-BOOTSTRAP_SCHEDULE = (
-    10,
-    15,
-    20,
-    30,
-    45,
-    60,
-)  # frames after which a rigid shape is looked for; the last decides
+# λ_0 and λ_γ: the more a constraint says, the less is left for the pull to rest and to the frame before.
+PULLS: dict[str, tuple[float, float]] = {
+    "bending": (1e-2, 1e-3),
+    "stretching": (2e-2, 3e-2),
+    "general": (2e-2, 3e-2),
+    "inextensible": (1e-3, 1e-3),
+}
+INEXTENSIBILITY = 3.0  # κ
+BOOTSTRAP_SCHEDULE = (10, 15, 20, 30, 45, 60)  # frames after which a rigid shape is looked for; the last decides
 
 
 class Phase(Enum):
@@ -202,7 +203,8 @@ def build_energy(model: Model, deformation: Deformation, *, paper: bool) -> Ener
     # A mode's eigenvalue says how much of the shape's extent it carries: weak modes are pulled to rest harder.
     stiffness = model.basis.eigenvalues**-0.5
     stiffness /= np.exp(np.log(stiffness).mean())
+    rest, smooth = PULLS[deformation]
+    energy = Energy(scale=scale, deformation=smooth, rest=rest * stiffness, rows=rows)
     if deformation == "inextensible":
-        edges = model.coarse_edges()
-        return Energy(scale=scale, deformation=1e-3, rest=1e-3 * stiffness, inextensibility=3.0, rows=rows, edges=edges)
-    return Energy(scale=scale, deformation=1e-2, rest=1e-2 * stiffness, rows=rows)
+        return replace(energy, inextensibility=INEXTENSIBILITY, edges=model.coarse_edges())
+    return energy
