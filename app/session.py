@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from app.ahead import Ahead
 from app.artwork import first_picture
 from app.compositing import Laid, painted
 from app.config import Run, Words, as_words
@@ -156,15 +157,19 @@ class Session:
             tracker = GuardedTracker(first.image, self._points_px)
         guarded = Guarded(Observation(self._points_px, np.ones(len(self._points_px), bool)))
         frame: Frame | None = first
-        while frame is not None:
-            with completed():
-                if self._tally.frames:
-                    with self._watch.time("track"):
-                        guarded = tracker.track(frame.image, self._reconstruction.predict())
-                self._tell(frame, guarded)
-                self._step(frame, guarded.observation, lost=tracker.lost)
-            with self._watch.time("decode"):
-                frame = next(frames, None)
+        with Ahead(frames, lambda frame: tracker.begin(frame.image)) as ahead:
+            while frame is not None:
+                with completed():
+                    if self._tally.frames:
+                        with self._watch.time("track"):
+                            guarded = tracker.track(frame.image, self._reconstruction.predict())
+                    ahead.begin()
+                    self._tell(frame, guarded)
+                    self._step(frame, guarded.observation, lost=tracker.lost)
+                with self._watch.time("decode"):
+                    frame = ahead.fetched()
+                with self._watch.time("track"):
+                    ahead.prepared()
 
     def _tell(self, frame: Frame, guarded: Guarded) -> None:
         """Say what the source said, and that the surface was lost or found; then nothing ties it to where it was."""

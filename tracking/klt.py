@@ -47,6 +47,17 @@ class Observation:
     visible: Flags
 
 
+@dataclass(frozen=True)
+class _Begun:
+    """What is known of a frame before there is a prediction: its picture, gray, the flow to it, fine and half."""
+
+    image: Image
+    gray: Image
+    points: Array
+    fine: Picture
+    coarse: Picture
+
+
 class PointTracker:
     """Follows points of a reference frame from frame to frame.
 
@@ -66,6 +77,12 @@ class PointTracker:
         self._coarse = Appearance(coarse, self._reference / 2.0, PATCH_RADIUS)
         self._points = self._reference.copy()
         self._affine = np.broadcast_to(np.eye(2), (len(points_px), 2, 2)).copy()
+        self._begun: _Begun | None = None
+
+    def begin(self, image_bgr: Image) -> None:
+        """Do what `track` can do of the next frame before there is a prediction: most of its work, in another thread."""
+        gray = cast(Image, cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY))
+        self._begun = _Begun(image_bgr, gray, self._flow(gray), *_pictures(gray))
 
     def track(self, image_bgr: Image, predicted_px: Array | None = None) -> Observation:
         """Find the points in the next frame.
@@ -75,15 +92,16 @@ class PointTracker:
             predicted_px: (P, 2) where the model expects the points, NaN where it does not know; lost points
                 are taken up again near there. None while there is no model: lost points stay lost.
         """
-        gray = cast(Image, cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY))
-        points = self._flow(gray)
-        self._gray = gray
+        if self._begun is None or self._begun.image is not image_bgr:
+            self.begin(image_bgr)
+        assert self._begun is not None
+        begun, self._begun = self._begun, None
+        self._gray, points, fine, coarse = begun.gray, begun.points, begun.fine, begun.coarse
         motion = self._motion(points, predicted_px)
         points[~motion.consistent] = np.nan
-        fine, coarse = _pictures(gray)
         points = self._refine(fine, coarse, points, motion)
         points = self._retrieve(fine, coarse, points, self._expected(points, motion, predicted_px), motion)
-        points[~_inside(points, gray.shape)] = np.nan
+        points[~_inside(points, fine.shape)] = np.nan
         self._points = points
         self._affine = motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
@@ -95,7 +113,7 @@ class PointTracker:
             image_bgr: (H, W, 3) uint8, of the reference frame's size.
             expected_px: (P, 2) where the points are, to some pixels; NaN where that is not known.
         """
-        self._gray = cast(Image, cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY))
+        self._gray, self._begun = cast(Image, cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)), None
         fine, coarse = _pictures(self._gray)
         points = np.full_like(self._reference, np.nan)
         for _ in range(RESUME_ROUNDS):  # what is found tells better where the others are

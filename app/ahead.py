@@ -1,0 +1,55 @@
+"""The next frame is fetched, and its optical flow begun, on another core while this one is reconstructed and recorded."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import TracebackType
+from typing import Self
+
+from tracking.video import Frame
+
+
+class Ahead:
+    """A thread that is one frame ahead; a context manager, which does not wait for a source that is silent.
+
+    Results do not depend on it: what is done ahead needs nothing of what goes on meanwhile.
+
+    Args:
+        frames: where they come from.
+        prepare: what is done with each, its picture given.
+    """
+
+    def __init__(self, frames: Iterator[Frame], prepare: Callable[[Frame], None]) -> None:
+        self._frames, self._prepare = frames, prepare
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="ahead")
+        self._fetched: Future[Frame | None] | None = None
+        self._prepared: Future[None] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._thread.shutdown(wait=False, cancel_futures=True)
+
+    def begin(self) -> None:
+        """Go for the next frame; returns at once."""
+        self._fetched = fetched = self._thread.submit(next, self._frames, None)
+        self._prepared = self._thread.submit(self._prepare_fetched, fetched)
+
+    def fetched(self) -> Frame | None:
+        """The frame begun with, once it is there; None at the end of the source.
+
+        Raises:
+            whatever the source raises.
+        """
+        assert self._fetched is not None
+        return self._fetched.result()
+
+    def prepared(self) -> None:
+        """Wait until the frame is prepared."""
+        assert self._prepared is not None
+        self._prepared.result()
+
+    def _prepare_fetched(self, fetched: "Future[Frame | None]") -> None:
+        frame = None if fetched.exception() else fetched.result()
+        if frame is not None:
+            self._prepare(frame)
