@@ -9,7 +9,17 @@ import tyro
 from app.errors import UsageError
 
 Name = Literal[
-    "accuracy", "peers", "mode-counts", "missing", "basis-time", "mode-shapes", "organ", "sample", "paper", "talking-face"
+    "accuracy",
+    "peers",
+    "mode-counts",
+    "metrics",
+    "missing",
+    "basis-time",
+    "mode-shapes",
+    "organ",
+    "sample",
+    "paper",
+    "talking-face",
 ]
 NAMES: tuple[str, ...] = get_args(Name)
 README_BEGIN, README_END = "<!-- reproduce: begin -->", "<!-- reproduce: end -->"
@@ -32,8 +42,8 @@ class Reproduce:
     out: Path
     """Folder for the report."""
     only: Annotated[tuple[Name, ...], tyro.conf.arg(metavar="NAME…")] = ()
-    """Experiments to run, of: accuracy, peers, mode-counts, missing, basis-time, mode-shapes, organ, sample, paper,
-    talking-face; without it all."""
+    """Experiments to run, of: accuracy, peers, mode-counts, metrics, missing, basis-time, mode-shapes, organ, sample,
+    paper, talking-face; without it all."""
     quick: bool = False
     """Fewer settings, one seed, fewer frames: for a first look."""
     readme: Path | None = None

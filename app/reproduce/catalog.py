@@ -1,12 +1,13 @@
 """All experiments, in the order of the report."""
 
-from app.reproduce import accuracy, basis_time, footage, missing, mode_counts, mode_shapes, organ_run, peers
+from app.reproduce import accuracy, basis_time, footage, metrics, missing, mode_counts, mode_shapes, organ_run, peers
 from app.reproduce.experiment import Experiment
 
 CATALOG: tuple[Experiment, ...] = (
     accuracy.EXPERIMENT,
     peers.EXPERIMENT,
     mode_counts.EXPERIMENT,
+    metrics.EXPERIMENT,
     missing.EXPERIMENT,
     basis_time.EXPERIMENT,
     mode_shapes.EXPERIMENT,

@@ -28,16 +28,15 @@ def shares(effort: Effort) -> tuple[float, ...]:
 def missing(work: Work) -> Result:
     """Every share on every line, over seeds."""
     hidden = shares(work.effort)
-    series, rows, failures = [], [], []
+    series, rows = [], []
+    failures: dict[str, list[str]] = {}  # what, and at which shares, one a seed
     for color, (line, metric) in enumerate(LINES):
         several = [trials(work, line, metric, share) for share in hidden]
-        failures += [
-            f"{line.name}, {share:.0%} missing, seed {seed}: {trial.failure}."
-            for share, trials_ in zip(hidden, several, strict=True)
-            for seed, trial in zip(work.effort.seeds, trials_, strict=True)
-            if trial.failure
-        ]
-        errors = [[percent(trial["e3d"]) for trial in trials_] for trials_ in several]
+        for share, trials_of_share in zip(hidden, several, strict=True):
+            for trial in trials_of_share:
+                if trial.failure:
+                    failures.setdefault(f"{line.name}: {trial.failure}", []).append(f"{share:.0%}")
+        errors = [[percent(trial["e3d"]) for trial in trials_of_share] for trials_of_share in several]
         static = percent(work.evaluated(line.config(work.data))["e3d_static"])
         means = [mean(values) for values in errors]
         series.append(Series(line.name, [100 * share for share in hidden], errors, color))
@@ -57,7 +56,8 @@ def missing(work: Work) -> Result:
         f"of the rest shape alone, in the mean over the seeds, or without a shape. The paper's error does not collapse "
         f"before about {PAPER_BREAKS_AT:.0%}."
     )
-    return Result([table], {"missing.png": charts([panel])}, remarks=[explained, *failures])
+    failed = [f"{what} ({', '.join(dict.fromkeys(shares_))} missing)." for what, shares_ in failures.items()]
+    return Result([table], {"missing.png": charts([panel])}, remarks=[explained, *failed])
 
 
 def trials(work: Work, line: Line, metric: str, share: float) -> list[Trial]:

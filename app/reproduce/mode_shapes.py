@@ -30,9 +30,8 @@ def mode_shapes(work: Work) -> Result:
     pictures = {}
     for name, rest, mesh, file in surfaces:
         basis = modal_basis(rest, mesh, 20)
-        pictures[file] = draw(
-            basis, mesh, spectrum(basis, mesh, "euclidean"), title(name, basis, "euclidean"), columns=DRAWN
-        )
+        headline, values = title(name, basis, "euclidean"), spectrum(basis, mesh, "euclidean")
+        pictures[file] = draw(basis, mesh, values, headline, columns=DRAWN, jpeg=True)
         work.step()
     figures = {"modes-dome.jpg": pictures.pop("modes-dome.jpg"), "spectrum.png": spectra(flag, flag_mesh)}
     work.step()
