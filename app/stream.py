@@ -1,10 +1,13 @@
 """The channel a recording is written through: Rerun's stream to a file, to viewers, to both or to nothing."""
 
+import os
 import shutil
+import subprocess
 from collections.abc import Iterable
 from pathlib import Path
 
 import rerun as rr
+import rerun_cli  # type: ignore[import-untyped]
 
 from app import entities
 from app.blueprint import blueprint
@@ -12,6 +15,8 @@ from app.errors import UsageError
 
 FLUSH_SECONDS = 10.0  # a viewer that hangs must not stop a run
 TICK_S = 1.0  # between two writes to the file: fewer, larger pieces; a killed run loses so much
+INDEXED_BYTES = 2 * 2**30  # larger recordings get no index: making it takes about twice as much memory
+INDEX_S = 600.0  # at most; it takes some seconds
 FULL_BYTES = 2**20  # so little left on a disk explains a failure
 
 Loggable = rr.AsComponents | Iterable[rr.DescribedComponentBatch]
@@ -29,7 +34,7 @@ class Stream:
         self._path = path
         sinks: list[rr.FileSink | rr.GrpcSink] = [rr.GrpcSink(url) for url in dict.fromkeys(urls)]
         if path is not None:
-            sinks.append(rr.FileSink(path))
+            sinks.append(rr.FileSink(path, write_footer=False))  # it would keep an index of all chunks in memory
         batches = rr.ChunkBatcherConfig(flush_tick=TICK_S) if not urls else None  # a viewer wants every frame at once
         self._stream = rr.RecordingStream(entities.APPLICATION, batcher_config=batches) if sinks else None
         if self._stream is None:
@@ -98,11 +103,40 @@ class Stream:
             if self._stream is not None:
                 self._stream.disconnect()
                 self._stream = None
+                if self._path is not None:
+                    index(self._path)
 
     def _failure(self, error: RuntimeError) -> UsageError:
         full = self._path is not None and shutil.disk_usage(self._path.parent).free < FULL_BYTES
         reason = "the disk is full" if full else str(error)
         return UsageError(f"cannot write {self._path}: {reason}; choose another place with --out")
+
+
+def index(path: Path) -> None:
+    """Add the index that makes a recording quick to open, and pack it; a file left without is as good, only slower.
+
+    A process of its own reads the whole file for it, which is why that of very long recordings stays as it is.
+    """
+    part = path.with_name(path.name + ".part")
+    program = Path(rerun_cli.__file__).with_name("rerun")
+    try:
+        if path.stat().st_size > INDEXED_BYTES or shutil.disk_usage(path.parent).free < path.stat().st_size + FULL_BYTES:
+            return
+        done = subprocess.run(
+            [program, "rrd", "optimize", "--max-rows", "1", "--max-size", "1B", path, "-o", part],
+            env=os.environ | {"RUST_LOG": "off"},
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=INDEX_S,
+            start_new_session=True,  # Ctrl-C ends the run, not this
+        )
+        if done.returncode == 0:
+            part.replace(path)
+    except (OSError, subprocess.TimeoutExpired):
+        pass
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def check_writable(path: Path, *, overwrite: bool) -> None:
