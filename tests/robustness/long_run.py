@@ -66,7 +66,8 @@ def main(video: Path = FACE) -> int:
     early, late = float(np.median(step[WARM : 2 * WARM])), float(np.median(step[-WARM:]))
     sys.stdout.write(
         f"{len(memory)} frames, {words['losses']} losses; memory at frame {WARM}: {memory[WARM]:.1f} MB, "
-        f"at the end {memory[-1]:.1f} MB, grown {grown:.1f} MB; median processor time per frame {early:.1f} ms, at the end {late:.1f} ms\n"
+        f"at the end {memory[-1]:.1f} MB, grown {grown:.1f} MB; "
+        f"median processor time per frame {early:.1f} ms, at the end {late:.1f} ms\n"
     )
     return int(grown > GROWTH_MB or late > SLOWER * early)
 
