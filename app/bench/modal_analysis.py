@@ -1,7 +1,8 @@
 """Modes by modal analysis, as mechanics has them: a linear elastic shell of triangles, stiffness and mass, 3p unknowns.
 
 Membrane: constant strain triangles (plane stress) in each triangle's plane. Bending: the thin plate's energy of the change
-in the discrete mean curvature (cotangent Laplacian), without rotations as unknowns. Free boundary, lumped mass.
+in the discrete mean curvature (cotangent Laplacian), without rotations as unknowns, which holds the outline a
+little against turning. Lumped mass. It is here for the time it takes.
 """
 
 import numpy as np
