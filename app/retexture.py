@@ -3,8 +3,9 @@
 from pathlib import Path
 from time import perf_counter
 from types import TracebackType
-from typing import Self
+from typing import Self, cast
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,7 +25,10 @@ from tracking.klt import Observation
 from tracking.video import Frame
 
 Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
 RRD_MAGIC = b"RRF"
+STILL_PX = 1.0
 
 
 def retexture(command: Retexture, progress: Progress) -> Words:
@@ -139,9 +143,8 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Words:
                     continue
                 frame = Frame(number, float(playback.times_s[i]), image)
                 if not begun:
-                    if i > 0:
-                        raise UsageError(f"{playback.path} has no picture of its first frame: run again with --image jpeg")
-                    painter.begin(frame, playback.texture_px, model, steady(playback.times_s)[0])
+                    still = Frame(number, frame.time_s, first_frame(playback, i, image))
+                    painter.begin(still, playback.texture_px, model, steady(playback.times_s)[0])
                     begun = True
                 if number < first:
                     continue
@@ -152,6 +155,25 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Words:
     if not begun:
         raise UsageError(f"{playback.path} contains no pictures: run again with --image jpeg or --image video")
     return {"source": command.source, "frames": len(playback.frames), "interrupted": interrupted}
+
+
+def first_frame(playback: Playback, i: int, image: Image) -> Image:
+    """The frame (H, W, 3) in which the vertices are at `texture_px`, right where the surface is.
+
+    It need not be in the recording, which may be a later part of a long one; the mesh's texture is a crop of it. Where
+    `run --texture` has painted that, it has to be the recording's first `image`, of row i.
+
+    Raises:
+        UsageError: there it is not.
+    """
+    if playback.configuration.get("texture") is None:
+        (width, height), (x, y), (h, w) = playback.size, playback.texture_origin.tolist(), playback.texture_bgr.shape[:2]
+        border = (y, height - y - h, x, width - x - w)
+        return cast(Image, cv2.copyMakeBorder(playback.texture_bgr, *border, cv2.BORDER_REPLICATE))
+    moved = np.linalg.norm(playback.W[i].T - playback.texture_px, axis=1)[playback.visible[i]]
+    if not len(moved) or np.median(moved) > STILL_PX:
+        raise UsageError(f"{playback.path} begins later than its run: give the first part of the recording")
+    return image
 
 
 def is_recording(source: str) -> bool:

@@ -1,5 +1,6 @@
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -17,7 +18,7 @@ from app.demo.motion import HEIGHT_MM, WIDTH_MM
 from app.errors import UsageError
 from app.playback import Playback
 from app.progress import Progress
-from app.retexture import is_recording, retexture
+from app.retexture import first_frame, is_recording, retexture
 from app.session import Session
 from app.video_out import PacedVideo, VideoSink
 from tests.app.terminal import Command, in_own_process
@@ -167,6 +168,18 @@ def test_a_video_is_painted_while_it_is_tracked(tmp_path: Path, videos: Path, te
 def test_without_its_name_a_live_run_leaves_no_recording(here: Path, videos: Path, texture: Path) -> None:
     retexture(command(videos / "turning.mp4", texture, here / "live.mp4", points=120, frames=":12"), Progress())
     assert [path.name for path in here.iterdir()] == ["live.mp4"]
+
+
+def test_the_first_frame_is_found_in_a_later_part(tmp_path: Path) -> None:
+    playback = Playback.load(write_run(tmp_path / "sheet.rrd").path)
+    elsewhere = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+    seen = first_frame(playback, 0, elsewhere)
+    assert seen.shape == elsewhere.shape
+    assert np.array_equal(seen[30:90, 40:120], picture()[30:90, 40:120])
+    painted = replace(playback, configuration={"texture": "card.png"})
+    assert first_frame(painted, 0, elsewhere) is elsewhere
+    with pytest.raises(UsageError, match="give the first part of the recording"):
+        first_frame(replace(painted, W=painted.W + 20), 0, elsewhere)
 
 
 def test_run_with_a_texture_paints_the_recording(tmp_path: Path, videos: Path, texture: Path) -> None:
