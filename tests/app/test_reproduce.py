@@ -209,9 +209,11 @@ def test_what_has_no_data_is_skipped(here: Path, modeshape: Command) -> None:
     assert readme.read_text().startswith("# Title")
 
 
+@pytest.mark.slow
 def test_real_data_give_every_table(shared_data: Path, tmp_path: Path) -> None:
-    command = Reproduce(shared_data, tmp_path / "out", only=("accuracy", "peers", "mode-shapes"), quick=True)
-    words = reproduce(command)
+    words = reproduce(
+        Reproduce(shared_data, tmp_path / "out", only=("accuracy", "mode-counts", "metrics", "missing"), quick=True)
+    )
     experiments = words["experiments"]
     assert isinstance(experiments, dict)
     [table, published] = experiments["accuracy"]["tables"]
@@ -220,6 +222,16 @@ def test_real_data_give_every_table(shared_data: Path, tmp_path: Path) -> None:
         line = dict(zip(table["columns"], row, strict=True))
         assert line["e3d %"] < line["rest shape alone"]
         assert line["e3d %"] <= line["camera"] + 1e-9
+    [table] = experiments["metrics"]["tables"]
+    assert {row[-1] for row in table["rows"]} <= set(table["columns"][1:-1])
+    assert experiments["missing"]["tables"][0]["rows"][0][-1].startswith("not up to")
+    assert [len(row) for row in experiments["mode-counts"]["tables"][0]["rows"]] == [5] * 8
+
+
+def test_real_data_stand_beside_peers(shared_data: Path, tmp_path: Path) -> None:
+    words = reproduce(Reproduce(shared_data, tmp_path / "out", only=("peers", "mode-shapes"), quick=True))
+    experiments = words["experiments"]
+    assert isinstance(experiments, dict)
     rows = {row[0]: row for row in experiments["peers"]["tables"][0]["rows"]}
     assert rows["PND2"][1] == 6.47
     assert rows["ours, on-line"][1] < rows["PND2"][1]
