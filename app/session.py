@@ -14,10 +14,12 @@ from threadpoolctl import threadpool_limits
 
 from app.ahead import Ahead
 from app.artwork import first_picture
+from app.behind import Behind
 from app.compositing import Laid, painted
 from app.config import Run, Words, as_words
 from app.errors import UsageError
 from app.interrupts import completed
+from app.memory import EVERY_FRAMES, give_back
 from app.mesh_file import rest_of_surface
 from app.observer import Followed, Observer
 from app.parts import RECORDINGS, Parts, free_name
@@ -93,7 +95,7 @@ class Session:
             if path is None and self._observer is None:
                 path = free_name(RECORDINGS, config.source)
             split_s = None if config.output.split_minutes is None else 60.0 * config.output.split_minutes
-            with Parts(path, self._record, self._summary, split_s) as self._recording, self._progress:
+            with Behind(Parts(path, self._record, self._summary, split_s)) as self._recording, self._progress:
                 self._started = perf_counter()
                 try:
                     self._progress.expect(video.frame_count)
@@ -163,9 +165,12 @@ class Session:
                     if self._tally.frames:
                         with self._watch.time("track"):
                             guarded = tracker.track(frame.image, self._reconstruction.predict())
-                    ahead.begin()
+                    if not self._config.drop_late:  # what is fetched early is late
+                        ahead.begin()
                     self._tell(frame, guarded)
                     self._step(frame, guarded.observation, lost=tracker.lost)
+                    if self._config.drop_late:
+                        ahead.begin()
                 with self._watch.time("decode"):
                     frame = ahead.fetched()
                 with self._watch.time("track"):
@@ -205,6 +210,8 @@ class Session:
             self._settle(estimates)
         self._recording.timing(frame.index, frame.time_s, self._watch.now)
         self._watch.now.clear()
+        if self._tally.frames % EVERY_FRAMES == 0:
+            give_back()
         self._progress.advance(phase.value if lost else self._reconstruction.phase.value, self._collected.last_rms_px)
 
     def _settle(self, estimates: list[ShapeEstimate]) -> None:
