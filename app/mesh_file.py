@@ -32,6 +32,8 @@ def load_mesh(path: Path) -> tuple[Array, Mesh]:
         raise UsageError(f"cannot read the mesh {path}: {error or type(error).__name__}") from None
     if vertices.ndim != 2 or len(vertices) < 4 or len(faces) < 1 or not np.isfinite(vertices).all():
         raise UsageError(f"the mesh {path} does not fit: it needs at least 4 finite vertices and a triangle")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise UsageError(f"the mesh {path} is damaged: its triangles name vertices that it does not have")
     return vertices, mesh_from_faces(faces)
 
 

@@ -1,0 +1,113 @@
+"""However a run ends, what it has written is there: killed, interrupted, on a full disk."""
+
+import json
+import random
+import resource
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from app.playback import Playback
+from tests.app.terminal import ENVIRONMENT, PROGRAM, in_own_process, turning, write_video
+from tests.synthetic_run import verify
+
+ARGUMENTS = ("--points", "120", "--rest-shape", "plane", "--bootstrap-frames", "5", "--modes", "6", "--out", "run.rrd")
+UNWRITTEN_S = 2.0  # at most so much of the past is lost by SIGKILL
+
+
+@pytest.fixture(scope="module")
+def endless(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_video(tmp_path_factory.mktemp("endless") / "endless.mp4", list(turning(80)) * 30)
+
+
+def start(video: Path, folder: Path, limit: int | None = None) -> "subprocess.Popen[str]":
+    """A run in a process of its own, its files no larger than `limit` bytes."""
+
+    def prepare() -> None:
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs ignore it
+        if limit is not None:
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    return subprocess.Popen(
+        [*PROGRAM, "run", str(video), *ARGUMENTS, "--json"],
+        cwd=folder,
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=prepare,
+    )
+
+
+def begun(process: "subprocess.Popen[str]", recording: Path) -> None:
+    """Wait until there is something in the recording."""
+    patience = time.monotonic() + 60
+    while not (recording.exists() and recording.stat().st_size > 300_000):
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < patience
+        time.sleep(0.02)
+
+
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(2, 10))])
+def test_a_killed_run_can_be_reviewed(endless: Path, tmp_path: Path, seed: int) -> None:
+    process = start(endless, tmp_path)
+    begun(process, tmp_path / "run.rrd")
+    time.sleep(random.Random(seed).uniform(0.0, 4.0))
+    process.kill()
+    process.communicate()
+    outcome = in_own_process(tmp_path, "review", "run.rrd", "--json")
+    assert outcome.code == 0, outcome.err
+    words = json.loads(outcome.out)
+    assert words["frames"] > 5
+    assert words["frames_with_shape"] > 0
+    written = (tmp_path / "run.rrd").stat().st_mtime
+    assert time.time() - written < 60
+    playback = Playback.load(tmp_path / "run.rrd")
+    assert playback.summary is None
+
+
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM], ids=lambda which: which.name)
+def test_an_interrupted_recording_verifies(endless: Path, tmp_path: Path, which: signal.Signals) -> None:
+    process = start(endless, tmp_path)
+    begun(process, tmp_path / "run.rrd")
+    process.send_signal(which)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 130, err
+    assert json.loads(out)["interrupted"] is True
+    verify(tmp_path / "run.rrd")
+
+
+def test_a_killed_run_loses_little(endless: Path, tmp_path: Path) -> None:
+    process = start(endless, tmp_path)
+    recording = tmp_path / "run.rrd"
+    begun(process, recording)
+    gaps, last = [], (recording.stat().st_size, time.monotonic())
+    until = time.monotonic() + 5
+    while time.monotonic() < until:
+        size = recording.stat().st_size
+        if size != last[0]:
+            gaps.append(time.monotonic() - last[1])
+            last = size, time.monotonic()
+        time.sleep(0.01)
+    process.kill()
+    process.communicate()
+    assert max(gaps) < UNWRITTEN_S
+
+
+def test_a_full_disk_is_told_and_earlier_recordings_stay(endless: Path, tmp_path: Path) -> None:
+    done = in_own_process(tmp_path, "run", endless, *ARGUMENTS, "--frames", ":10")
+    assert done.code == 0, done.err
+    earlier = tmp_path / "run.rrd"
+    earlier.rename(tmp_path / "earlier.rrd")
+    before = (tmp_path / "earlier.rrd").read_bytes()
+    process = start(endless, tmp_path, limit=700_000)
+    _, err = process.communicate(timeout=120)
+    assert process.returncode == 2, err
+    assert "Traceback" not in err
+    assert "error: cannot write run.rrd" in err
+    assert (tmp_path / "earlier.rrd").read_bytes() == before
+    verify(tmp_path / "earlier.rrd")
