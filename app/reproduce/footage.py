@@ -81,7 +81,7 @@ def filmed(work: Work, footage: Footage) -> Result:
                 trial["fps"],
             )
         )
-        setting = "no option" if focal is None else f"focal length {focal:g} px"
+        setting = "no focal length given" if focal is None else f"focal length {focal:g} px"
         headlines.append(Headline(f"{footage.name}, video", setting, e3d, static))
         playback = playback or (None if trial.failure else Playback.load(path))
     table = Table(footage.name, COLUMNS, rows)

@@ -27,12 +27,18 @@ def peers(work: Work) -> Result:
     ]
     table = Table(f"e3d in %; the others are {PEERS_SOURCE}", COLUMNS, [*ours, *theirs])
     headlines = [
-        Headline("flag250", "on-line, nothing given", flag[0], None, best_peer("flag")),
+        Headline("flag250", "on-line, rest shape from 15 frames", flag[0], None, best_peer("flag")),
         Headline(
-            "flag250", "their depth signs chosen with the truth, ours not", flag[0], None, best_peer("flag_sign_free")
+            "flag250",
+            "the same; their depth signs chosen with the truth, ours not",
+            flag[0],
+            None,
+            best_peer("flag_sign_free"),
         ),
-        Headline("face37", "on-line, nothing given", face[0], None, best_peer("face")),
-        Headline("face37, 40% missing", "on-line, nothing given", face[1], None, best_peer("face_missing")),
+        Headline("face37", "on-line, rest shape from its first frames", face[0], None, best_peer("face")),
+        Headline(
+            "face37, 40% missing", "on-line, rest shape from its first frames", face[1], None, best_peer("face_missing")
+        ),
     ]
     return Result([table], headlines=headlines)
 

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 PAPER = (
-    "Agudo, Montiel, Calvo, Moreno-Noguer, WACV 2016, on their 594-point flag (not public; flag250 is 250 of its markers)"
+    "Agudo, Montiel, Calvo, Moreno-Noguer, WACV 2016, on their 594-point flag "
+    "(not public; flag250 is 250 points of the same capture)"
 )
 PAPER_MISSING, PAPER_MODES = 0.4, 20  # the setting of the three figures that follow
 PAPER_E3D = 2.92

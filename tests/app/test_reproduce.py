@@ -124,6 +124,11 @@ def test_the_readme_keeps_all_but_the_table() -> None:
     assert replaced_between(f"{README_END} {README_BEGIN}", README_BEGIN, README_END, "new\n") is None
 
 
+def test_our_readme_has_a_place_for_the_table() -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text()
+    assert replaced_between(readme, README_BEGIN, README_END, "") is not None
+
+
 def test_the_processor_is_named_where_known() -> None:
     assert processor(lambda: "vendor_id : X\nmodel name\t: Fast Chip 3\n") == "Fast Chip 3"
 
