@@ -14,7 +14,7 @@ from app.progress import Progress
 from app.results import check_free, writable
 from reconstruction import distances
 from reconstruction.mesh import Mesh
-from reconstruction.modes import Metric, ModalBasis, doubly_centred
+from reconstruction.modes import EXACT_POINTS, Metric, ModalBasis, doubly_centred
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,9 @@ def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh
 
 
 def spectrum(basis: ModalBasis, mesh: Mesh, metric: str) -> Array:
-    """All eigenvalues (p,) of −½CDC, descending."""
+    """All eigenvalues (p,) of −½CDC, descending; of many points those of the basis, since D would not fit in memory."""
+    if basis.rest.shape[1] > EXACT_POINTS:
+        return basis.eigenvalues
     D = distances.dissimilarity(cast(Metric, metric), basis.rest, mesh.edges)
     return np.asarray(np.linalg.eigvalsh(doubly_centred(D))[::-1], np.float64)
 

@@ -110,6 +110,11 @@ def test_the_spectrum_begins_with_the_modes(run: Run, metric: str) -> None:
     assert values[:MODES] == pytest.approx(basis.eigenvalues)
 
 
+def test_of_many_points_the_spectrum_is_that_of_the_modes(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.modes.EXACT_POINTS", len(run.pixels) - 1)
+    np.testing.assert_array_equal(spectrum(run.basis, run.mesh, "euclidean"), run.basis.eigenvalues)
+
+
 @pytest.mark.parametrize(("count", "columns"), [(1, 5), (3, 2), (12, 12)])
 def test_any_number_of_modes(run: Run, count: int, columns: int) -> None:
     basis = modal_basis(run.basis.rest, run.mesh, count)
