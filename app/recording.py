@@ -13,6 +13,7 @@ from typing import Literal, Self
 
 # Read when Rerun is loaded, here first: what goes wrong is said by us, once, without a time stamp.
 os.environ.setdefault("RUST_LOG", "off")
+os.environ.setdefault("MIMALLOC_PURGE_DELAY", "0")  # its memory goes back to the system at once: a long run stays small
 
 import numpy as np
 import rerun as rr

@@ -19,7 +19,6 @@ from app.compositing import Laid, painted
 from app.config import Run, Words, as_words
 from app.errors import UsageError
 from app.interrupts import completed
-from app.memory import EVERY_FRAMES, give_back
 from app.mesh_file import rest_of_surface
 from app.observer import Followed, Observer
 from app.parts import RECORDINGS, Parts, free_name
@@ -210,8 +209,6 @@ class Session:
             self._settle(estimates)
         self._recording.timing(frame.index, frame.time_s, self._watch.now)
         self._watch.now.clear()
-        if self._tally.frames % EVERY_FRAMES == 0:
-            give_back()
         self._progress.advance(phase.value if lost else self._reconstruction.phase.value, self._collected.last_rms_px)
 
     def _settle(self, estimates: list[ShapeEstimate]) -> None:
