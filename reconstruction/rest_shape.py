@@ -24,6 +24,8 @@ JUDGING_POINTS = 150  # well-spread points are enough to decide on
 FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
 TILT_DEGREES = 25.0  # tilts a flat sheet is started from
 TILT_GAIN = 0.7  # a tilt is believed when it lowers the reprojection error below this share of the frontal one's
+BENT_PX = 1.0  # reprojection error above which a sheet is not flat in all frames
+FEWEST_FLAT = 10  # frames that tell a tilt
 STILL_PX = 0.5  # apparent motion, beyond that of a similarity, that is not noise
 
 
@@ -164,6 +166,8 @@ def plane(W: Array, visible: Visibility, camera: Camera) -> RestShape:
     level, tilted = found[0], min(found[1:], key=lambda result: result[1])
     turn = view_turn_degrees(tilted[0].R)
     if tilted[1] > TILT_GAIN * level[1] or turn < TURN_DEGREES:
+        if tilted[1] > BENT_PX and len(W) >= 2 * FEWEST_FLAT:  # it bends meanwhile: judge by the frames before
+            return plane(W[: len(W) // 2], visible[: len(W) // 2], camera)
         note = f"flat sheet facing the camera: its tilt does not show in {len(W)} frames"
         return RestShape("plane", frontal, note)
     whole = sheet(first, tilted[0].R[0], camera)

@@ -210,3 +210,15 @@ def test_judging_points_are_well_spread_and_often_seen() -> None:
     chosen = judging_points(W, visible)
     assert len(set(chosen.tolist())) == len(chosen)
     assert chosen.max() < 300
+
+
+def test_a_sheet_that_bends_later_is_judged_by_its_flat_frames() -> None:
+    rng = np.random.default_rng(4)
+    sheet, tilt, frames = flat(rng, POINTS), turn((20, 0, 0)), 40
+    curvature = np.concatenate([np.zeros(frames // 2), 0.012 * np.sin(np.arange(frames // 2) / 4)])
+    R = np.concatenate([turns(frames // 2), turns(frames // 2)]) @ tilt
+    W, _ = seen(np.stack([rolled(sheet, c) for c in curvature]), R, PERSPECTIVE)
+    W = W + rng.normal(0, 0.1, W.shape)
+    found = rest_shape.plane(W, np.ones((frames, POINTS), bool), PERSPECTIVE)
+    assert "tilted" in found.note
+    assert shape_error(found.motion.R[0] @ found.motion.shape, R[0] @ sheet) < 0.02
