@@ -1,11 +1,14 @@
 """The next frame is fetched, and its optical flow begun, on another core while this one is reconstructed and recorded."""
 
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Self
 
 from tracking.video import Frame
+
+SWITCH_S = 0.0005  # after which one thread lets another: with Python's 5 ms, each of many short waits costs as much
 
 
 class Ahead:
@@ -25,9 +28,12 @@ class Ahead:
         self._prepared: Future[None] | None = None
 
     def __enter__(self) -> Self:
+        self._interval_s = sys.getswitchinterval()
+        sys.setswitchinterval(SWITCH_S)
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        sys.setswitchinterval(self._interval_s)
         self._thread.shutdown(wait=False, cancel_futures=True)
 
     def begin(self) -> None:

@@ -36,8 +36,8 @@ def bench(command: Bench, progress: Progress) -> Words:
         angles = {metric: basis.angle_degrees(metric, say) for metric in basis.METRICS}
         runs = list(end_to_end.whole_runs(quick=quick, say=say))
         help_s = end_to_end.help_s(say)
-        many_mb = None if quick else end_to_end.many_points_mb(say)
-    ratios = window.ratios(timings, races) | basis.ratios(basis_times, angles) | end_to_end.ratios(runs, help_s, many_mb)
+        many = None if quick else end_to_end.many_points(say)
+    ratios = window.ratios(timings, races) | basis.ratios(basis_times, angles) | end_to_end.ratios(runs, help_s, many)
     if command.plot:
         from app.bench.plot import draw
 

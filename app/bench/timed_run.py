@@ -27,9 +27,9 @@ def main() -> None:
 
     assert isinstance(command, Run)
     clock = Clock()
-    Session(command, clock).run()
+    words = Session(command, clock).run()
     clock.stamps.append(time())  # with everything written
-    sys.stdout.write(json.dumps({"stamps": clock.stamps, "peak_mb": peak_mb()}) + "\n")
+    sys.stdout.write(json.dumps({"stamps": clock.stamps, "peak_mb": peak_mb(), "points": words["points"]}) + "\n")
 
 
 if __name__ == "__main__":

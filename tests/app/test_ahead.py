@@ -1,5 +1,6 @@
 """One frame ahead: order, errors, ends, and sources that are silent."""
 
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -7,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.ahead import Ahead
+from app.ahead import SWITCH_S, Ahead
 from tracking.video import Frame
 
 
@@ -29,6 +30,13 @@ def test_frames_come_in_order_and_prepared() -> None:
         assert ahead.fetched() is None
         ahead.prepared()
     assert prepared == list(range(5))
+
+
+def test_threads_switch_fast_meanwhile_only() -> None:
+    before = sys.getswitchinterval()
+    with Ahead(frames(1), lambda _: None):
+        assert sys.getswitchinterval() == pytest.approx(SWITCH_S)
+    assert sys.getswitchinterval() == before
 
 
 def test_it_works_while_the_caller_does() -> None:
