@@ -1,17 +1,19 @@
 """Finding or starting the viewer that a recording is streamed to."""
 
 import socket
+import subprocess
 from pathlib import Path
+from time import monotonic, sleep
 from urllib.parse import urlsplit
 
-import rerun as rr
 import rerun_cli  # type: ignore[import-untyped]
 
-from app import entities
 from app.errors import UsageError
 
 PORT = 9876
 TIMEOUT_S = 1.0
+SETTLE_S = 0.5  # after which one without a screen has ended
+START_S = 15.0  # until a viewer answers
 
 
 def running_viewer(address: str) -> str:
@@ -40,19 +42,21 @@ def spawned_viewer() -> str:
     """
     if not listening("127.0.0.1", PORT):
         program = Path(rerun_cli.__file__).with_name("rerun")  # of this very version, whatever is on PATH
-        stream = rr.RecordingStream(entities.APPLICATION)  # only because spawning asks for one
+        # Not by rr.spawn: it would be open to the whole network.
+        command = [str(program), "--bind", "127.0.0.1", "--port", str(PORT), "--hide-welcome-screen", "--expect-data-soon"]
+        quiet = subprocess.DEVNULL
         try:
-            rr.spawn(
-                port=PORT,
-                connect=False,
-                hide_welcome_screen=True,
-                executable_path=str(program),
-                recording=stream,
-            )
-        except RuntimeError as error:
-            raise UsageError(f"--view: the viewer does not start: {error}") from error
-        if not listening("127.0.0.1", PORT):
-            raise UsageError("--view: the viewer does not start (is there a screen?); open the file later")
+            viewer = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)
+        except OSError as error:
+            raise UsageError(f"--view: the viewer does not start: {error.strerror}") from error
+        patience = monotonic() + START_S
+        while not listening("127.0.0.1", PORT):
+            if viewer.poll() is not None or monotonic() > patience:
+                raise UsageError("--view: the viewer does not start (is there a screen?); open the file later")
+            sleep(0.05)
+        sleep(SETTLE_S)
+        if viewer.poll() is not None:
+            raise UsageError("--view: the viewer does not stay (is there a screen?); open the file later")
     return f"rerun+http://127.0.0.1:{PORT}/proxy"
 
 
