@@ -12,6 +12,8 @@ from time import perf_counter, time
 
 import numpy as np
 
+from app.bench.own_process import apart
+
 ROOT = Path(__file__).parents[2]
 KINECT = ROOT.parent / "shared" / "data" / "kinect_paper.mp4"  # research data, not part of the program
 KINECT_ROI = (195, 95, 325, 265)
@@ -59,7 +61,7 @@ def whole_runs(*, quick: bool, say: Say) -> Iterator[WholeRun]:
 
 def whole_run(name: str, video: Path, roi: tuple[int, int, int, int], points: int, frames: int | None) -> WholeRun:
     """One run and its bare loop, in processes of their own."""
-    words = run_apart(video, roi, points, frames, ())
+    words = run_apart(video, roi, points, frames)
     stamps = np.array(words["stamps"])
     bare = child("app.bench.bare_loop", str(video), *map(str, roi), str(points), str(len(stamps)))
     each_ms = 1e3 * np.diff(stamps)
@@ -77,23 +79,40 @@ def whole_run(name: str, video: Path, roi: tuple[int, int, int, int], points: in
 
 
 def many_points(say: Say) -> tuple[int, float]:
-    """Points and peak memory in MB of a run with up to as many as in the paper's largest model, for a few frames."""
-    from app.demo import sample
-
-    say(f"run with {MANY_POINTS} points")
-    made = sample()
-    options = ("--rest-shape", "plane", "--bootstrap-frames", "2", "--image", "none")
-    words = run_apart(made.video, (0, 0, 640, 480), MANY_POINTS, MANY_FRAMES, options)
-    return int(words["points"]), float(words["peak_mb"])
+    """Points and peak memory in MB of `evaluate` on as many points as the paper's largest model, for a few frames."""
+    say(f"evaluate with {MANY_POINTS} points")
+    return apart(evaluate_many)
 
 
-def run_apart(
-    video: Path, roi: tuple[int, int, int, int], points: int, frames: int | None, options: tuple[str, ...]
-) -> dict[str, float]:
+def evaluate_many() -> int:
+    """Tracks of a surface that turns, reconstructed from its first true shape; returns the number of points."""
+    from app.bench.problems import FOCAL_PX, surface
+    from app.config import Evaluate, Model
+    from app.evaluate import evaluate
+    from app.progress import Progress
+    from reconstruction.camera import quaternion_exp, rotation_from_quaternion
+    from tracking.tracks import Tracks
+
+    shape = surface(MANY_POINTS)
+    turns = rotation_from_quaternion(
+        quaternion_exp(np.linspace(0, 0.5, MANY_FRAMES)[:, None] * np.array([[0.3, 1.0, 0.2]]))
+    )
+    shapes = turns @ shape + np.array([[0.0], [0.0], [FOCAL_PX]])
+    W = FOCAL_PX * shapes[:, :2] / shapes[:, 2:]
+    K = np.diag([FOCAL_PX, FOCAL_PX, 1.0])
+    seen = np.ones((MANY_FRAMES, MANY_POINTS), np.bool_)
+    with TemporaryDirectory(prefix="modeshape-") as folder:
+        path = Path(folder, "tracks.npz")
+        Tracks(W, seen, K=K, S_gt=shapes, gt_frames=np.arange(MANY_FRAMES)).save(path)
+        evaluate(Evaluate(path, rest_shape="first-truth", model=Model(modes=30)), Progress())
+    return MANY_POINTS
+
+
+def run_apart(video: Path, roi: tuple[int, int, int, int], points: int, frames: int | None) -> dict[str, float]:
     """`modeshape run` in a process that notes when each frame is done."""
     with TemporaryDirectory(prefix="modeshape-") as folder:
         where = ["--roi", *map(str, roi), "--points", str(points), "--frames", f":{frames or ''}"]
-        arguments = ["run", str(video), *where, "--out", str(Path(folder, "run.rrd")), *options]
+        arguments = ["run", str(video), *where, "--out", str(Path(folder, "run.rrd"))]
         started = time()
         return child("app.bench.timed_run", *arguments) | {"started": started}
 
