@@ -3,8 +3,6 @@
 A frame's parameters are q (4, w first), t (2), log s and the free rows of Λ' (row by row).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,25 +16,18 @@ TURN = SANDWICH.reshape(4, 4, 3, 3)
 TURN = TURN + TURN.swapaxes(0, 1)  # dR/dq_i = Σ_j TURN[ij] q_j
 
 
-@dataclass(frozen=True)
 class FrameData:
     """Reprojection of one frame: ρ/√p, all x first.
 
-    Attributes:
+    Args:
         step: the problem.
         W: (2, p) the frame's points.
     """
 
-    step: WindowStep
-    W: Array
-
-    def __post_init__(self) -> None:
-        B = self.step.B
-        object.__setattr__(self, "slope", (self.W / self.step.focal)[:, None])  # w
-        object.__setattr__(self, "modes", np.ascontiguousarray(B[3:-1].T))
-
-    slope: Array = None  # type: ignore[assignment]
-    modes: Array = None  # type: ignore[assignment]
+    def __init__(self, step: WindowStep, W: Array) -> None:
+        self.step, self.W = step, W
+        self._slope = (W / step.focal)[:, None]  # w
+        self._modes = np.ascontiguousarray(step.B[3:-1].T)
 
     def residual(self, q: Array, t: Array, log_s: float, free: Array) -> Array:
         """(2p,)."""
@@ -53,8 +44,8 @@ class FrameData:
         of_t[:p], of_t[p:] = (by, 0), (0, by)
         of_log_s[:, 0] = by * self._placed(A, shape).ravel()
         rows = list(self.step.energy.rows)
-        lever = by * (A[:2, None, :] - self.slope.transpose(0, 2, 1) * A[2])[:, :, rows]  # (2, p, rows)
-        np.multiply(lever[..., None], self.modes[:, None, :], out=of_Lambda.reshape(2, p, len(rows), -1))
+        lever = by * (A[:2, None, :] - self._slope.transpose(0, 2, 1) * A[2])[:, :, rows]  # (2, p, rows)
+        np.multiply(lever[..., None], self._modes[:, None, :], out=of_Lambda.reshape(2, p, len(rows), -1))
 
     def _shape(self, free: Array) -> Array:
         """(3, p) in the principal frame."""
@@ -65,7 +56,7 @@ class FrameData:
     def _placed(self, A: Array, shape: Array) -> Array:
         """A S (2, p) multiplied out for perspective: (A S)_c − w_c (A S)_3."""
         moved = A @ shape
-        return np.asarray(moved[:2] - self.slope[:, 0] * moved[2])
+        return np.asarray(moved[:2] - self._slope[:, 0] * moved[2])
 
 
 def change_weights(step: WindowStep) -> Array:
