@@ -1,6 +1,5 @@
 """Reading a recording's file row by row: complete, of a killed run, or cut off."""
 
-import os
 import struct
 import warnings
 from collections import defaultdict
@@ -10,8 +9,6 @@ from operator import attrgetter
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import BinaryIO
-
-os.environ.setdefault("RUST_LOG", "off")  # read when Rerun is loaded: what goes wrong is said by us
 
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]

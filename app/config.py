@@ -28,8 +28,9 @@ class Model:
     """Frames adjusted together."""
     energy: Literal["anchored", "paper"] = "anchored"
     """Anchored: tied to the past and pulled to rest. Paper: the paper's section 5 as printed (orthographic)."""
-    focal: float | None = None
-    """Focal length in pixels; without it that of the file, or the picture's width."""
+    focal: float | Literal["auto"] | None = None
+    """Focal length in pixels; without it that of the file, or the picture's width; auto: from the first frames, where
+    they hold it."""
 
     def __post_init__(self) -> None:
         if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:
@@ -38,7 +39,7 @@ class Model:
             raise UsageError(f"--modes {self.modes} is too few: give 1 and more")
         if self.window < 1:
             raise UsageError(f"--window {self.window} is too short: give 1 and more")
-        if self.focal is not None and not self.focal > 0:
+        if isinstance(self.focal, float) and not self.focal > 0:
             raise UsageError(f"--focal {self.focal} is no focal length: give pixels, more than 0")
 
 

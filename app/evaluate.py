@@ -63,6 +63,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Words:
         "modes": config.model.modes,
         "rest_shape": rest.kind,
         "rest_shape_note": rest.note,
+        **reconstruction.focal_words,
         "bootstrap_frames": reconstruction.bootstrap_frames,
         "deformation": reconstruction.deformation,
         "reprojection_rms": collected.reprojection_rms_px,
@@ -91,6 +92,7 @@ def prepare(config: Evaluate, tracks: Tracks) -> Reconstruction:
         deformation=model.deformation,
         window=model.window,
         energy=model.energy,
+        estimate_focal=model.focal == "auto",
     )
     return Reconstruction(camera_of(config, tracks), settings, given, mesh)
 
@@ -121,8 +123,10 @@ def camera_of(config: Evaluate, tracks: Tracks) -> Camera:
         return Camera()
     if K is not None:
         camera = Camera(float(K[0, 0]), K[:2, 2].copy())
-        return replace(camera, focal_px=focal) if focal else camera
+        return replace(camera, focal_px=focal) if isinstance(focal, float) else camera
     if focal is None:
         raise UsageError(f"{config.tracks} has no K: give --focal, or --camera orthographic")
     seen = np.where(tracks.visible[:, None], tracks.W, np.nan)
+    if focal == "auto":  # pictures are about as wide as what moves in them
+        focal = float(np.nanmax(seen[:, 0]) - np.nanmin(seen[:, 0]))
     return Camera(focal, np.nanmean(seen, axis=(0, 2)))

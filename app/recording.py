@@ -4,16 +4,11 @@ What is written where is listed in `app.entities`.
 """
 
 import json
-import os
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
-
-# Read when Rerun is loaded, here first: what goes wrong is said by us, once, without a time stamp.
-os.environ.setdefault("RUST_LOG", "off")
-os.environ.setdefault("MIMALLOC_PURGE_DELAY", "0")  # its memory goes back to the system at once: a long run stays small
 
 import numpy as np
 import rerun as rr

@@ -113,7 +113,7 @@ class Session:
         config, output = self._config, self._config.output
         return Recording(
             path,
-            configuration=as_words(config) | {"focal_px": self._focal_px},
+            configuration=as_words(config),
             size=self._size,
             connect=output.connect,
             view=output.view,
@@ -134,7 +134,7 @@ class Session:
         gray = cast(NDArray[np.uint8], cv2.cvtColor(first.image, cv2.COLOR_BGR2GRAY))
         points_px = detect_corners(gray, region, config.points)
         width, height = video.size
-        focal = config.model.focal or float(width)
+        focal = config.model.focal if isinstance(config.model.focal, float) else float(width)
         camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
         settings = Settings(
             modes=config.model.modes,
@@ -142,6 +142,7 @@ class Session:
             deformation=config.model.deformation,
             window=config.model.window,
             energy=config.model.energy,
+            estimate_focal=config.model.focal == "auto",
             bootstrap_frames=None if config.model.bootstrap_frames == "auto" else config.model.bootstrap_frames,
         )
         if config.rest_shape in ("auto", "rigid", "plane"):
@@ -240,8 +241,9 @@ class Session:
         rest, model = self._reconstruction.rest, self._reconstruction.model
         assert rest is not None
         index = next(reversed(self._times))
-        self._recording.event(index, self._times[index], rest.note)
-        self._progress.say(rest.note)
+        for note in filter(None, (rest.note, self._reconstruction.focal_note)):
+            self._recording.event(index, self._times[index], note)
+            self._progress.say(note)
         first = self._first.image
         if self._picture is not None:
             laid = Laid(self._config.place, self._config.opacity)
@@ -250,12 +252,6 @@ class Session:
         if self._observer:
             self._observer.begin(self._first, self._points_px, model, self._fps)
         self._modelled = True
-
-    @property
-    def _focal_px(self) -> float | None:
-        """The focal length in force; None for an orthographic camera."""
-        camera = self._reconstruction.camera
-        return camera.focal_px if camera.perspective else None
 
     def _summary(self) -> Words:
         config, rest, frames = self._config, self._reconstruction.rest, self._tally.frames
@@ -269,7 +265,7 @@ class Session:
             "rest_shape_note": rest.note if rest else None,
             "bootstrap_frames": self._reconstruction.bootstrap_frames,
             "deformation": self._reconstruction.deformation,
-            "focal_px": self._focal_px,
+            **self._reconstruction.focal_words,
             **self._tally.words,
             "reprojection_rms_px": self._collected.reprojection_rms_px,
             "fps": frames / elapsed_s,

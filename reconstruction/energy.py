@@ -148,11 +148,12 @@ def evaluate(energy: Energy, data: Statistics, state: State, before: State | Non
     return np.asarray(value)
 
 
-def linearise(energy: Energy, data: Statistics, state: State, before: State | None) -> Normal:
-    """Value, gradient and Gauss-Newton blocks of the whole energy at a state."""
+def linearise(energy: Energy, data: Statistics, state: State, before: State | None, value: Array | None = None) -> Normal:
+    """Value (n,), if it is not known, gradient and Gauss-Newton blocks of the whole energy at a state."""
     n, r = len(state), state.Lambda.shape[2]
     d = POSE + len(energy.rows) * r
-    normal = Normal(evaluate(energy, data, state, before), np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((n - 1, d, d)))
+    value = evaluate(energy, data, state, before) if value is None else value
+    normal = Normal(value, np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((n - 1, d, d)))
     add_data(normal, energy, data, state)
     add_rest(normal, energy, state)
     if energy.edges is not None:
@@ -170,14 +171,15 @@ def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> 
     """Reprojection, quadratic in M: pose by the chain rule, Λ as a Kronecker product of AᵀA and the Υ part of the sums."""
     n, r = len(state), state.Lambda.shape[2]
     rows = list(energy.rows)
-    A, M = state.scaled_rotations(), state.matrices()
+    M = state.matrices()
+    A = M[:, :, :3]
     pose = np.zeros((n, POSE, 3, 4 + r))  # dM/d(θ, t, log s)
     X = np.concatenate([np.broadcast_to(np.eye(3), (n, 3, 3)), state.Lambda], axis=2)
     pose[:, :3, :, :-1] = A[:, None] @ (HAT @ X[:, None])
     pose[:, 3, 0, -1] = pose[:, 4, 1, -1] = 1.0
     pose[:, 5, :, :-1] = M[:, :, :-1]
     slope = statistics.gradient(data, M)
-    curved = statistics.apply(data.gram, pose)
+    curved = statistics.apply(data, pose)
     flat = pose.reshape(n, POSE, -1)
     normal.gradient[:, :POSE] += (flat @ slope.reshape(n, -1, 1))[:, :, 0]
     normal.diagonal[:, :POSE, :POSE] += flat @ curved.reshape(n, POSE, -1).transpose(0, 2, 1)
@@ -195,8 +197,8 @@ def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> 
         axis=1,
     )
     modes = data.gram[:, :, 3:-1, 3:-1]
-    kron = np.einsum("ngij,ngab->niajb", factors, modes, optimize=True)
-    normal.diagonal[:, POSE:, POSE:] += kron.reshape(n, k, k)
+    kron = (factors.reshape(n, 4, -1).transpose(0, 2, 1) @ modes.reshape(n, 4, -1)).reshape(n, len(rows), len(rows), r, r)
+    normal.diagonal[:, POSE:, POSE:] += kron.transpose(0, 1, 3, 2, 4).reshape(n, k, k)
 
 
 def add_rest(normal: Normal, energy: Energy, state: State) -> None:

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.energy import CoarseEdges, State
-from reconstruction.mesh import Mesh, farthest_points, triangulate, unique_edges
-from reconstruction.modes import ModalBasis
+from reconstruction.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges
+from reconstruction.modes import Metric, ModalBasis, modal_basis, principal_axes
+from reconstruction.rest_shape import RestShape
 from reconstruction.statistics import Statistics, frame_statistics
 
 Array = NDArray[np.float64]
@@ -116,3 +117,22 @@ class Model:
         edges = chosen[unique_edges(triangulate(rest[:2, chosen].T).faces)]
         d = rest[:, edges[:, 1]] - rest[:, edges[:, 0]]
         return CoarseEdges(d, modes[:, edges[:, 1]] - modes[:, edges[:, 0]], np.linalg.norm(d, axis=0))
+
+
+def build_model(
+    rest: RestShape, camera: Camera, modes: int, metric: Metric = "euclidean", mesh: Mesh | None = None
+) -> Model:
+    """Mesh and modes of a rest shape.
+
+    Raises:
+        ReconstructionError: more modes than the points carry.
+    """
+    shape = rest.motion.shape
+    if mesh is None:
+        mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
+        x, y = (rest.motion.R[0] @ shape)[:2]
+        a, b, c = mesh.faces.T
+        area = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a])
+        if area.sum() > 0:  # y points down: outward normals face the camera when the image winds the other way
+            mesh = mesh_from_faces(mesh.faces[:, ::-1])
+    return Model(modal_basis(shape, mesh, modes, metric), mesh, camera)

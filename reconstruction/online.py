@@ -7,34 +7,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from reconstruction import ReconstructionError, rest_shape
+from reconstruction import ReconstructionError, focal, rest_shape
 from reconstruction.camera import Camera
-from reconstruction.energy import Energy
-from reconstruction.mesh import Mesh, mesh_from_faces, triangulate
-from reconstruction.model import Model, ShapeEstimate
-from reconstruction.modes import Metric, modal_basis, principal_axes
+from reconstruction.constraints import Deformation, build_energy, chosen
+from reconstruction.mesh import Mesh
+from reconstruction.model import Model, ShapeEstimate, build_model
+from reconstruction.modes import Metric
 from reconstruction.rest_shape import RestShape
-from reconstruction.rigid import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE
 from reconstruction.window import SlidingWindow
 
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
 
-Deformation = Literal["auto", "bending", "stretching", "general", "inextensible"]
-ROWS: dict[str, tuple[int, ...]] = {
-    "bending": (2,),
-    "stretching": (0, 1),
-    "general": (0, 1, 2),
-    "inextensible": (0, 1, 2),
-}
-# λ_0 and λ_γ: the more a constraint says, the less is left for the pull to rest and to the frame before.
-PULLS: dict[str, tuple[float, float]] = {
-    "bending": (1e-2, 1e-3),
-    "stretching": (2e-2, 3e-2),
-    "general": (2e-2, 3e-2),
-    "inextensible": (1e-3, 1e-3),
-}
-INEXTENSIBILITY = 3.0  # κ
 BOOTSTRAP_SCHEDULE = (10, 15, 20, 30, 45, 60)  # frames after which a rigid shape is looked for; the last decides
 
 
@@ -58,6 +42,7 @@ class Settings:
         deformation: constraint on Λ (§3.4).
         window: frames 𝒲 adjusted together.
         energy: anchored (tied to the past, pulled to rest) or the paper's §5 as printed.
+        estimate_focal: whether the first frames may say the focal length of a perspective camera.
     """
 
     rest_shape: Literal["auto", "rigid", "plane"] = "auto"
@@ -67,13 +52,14 @@ class Settings:
     deformation: Deformation = "auto"
     window: int = 5
     energy: Literal["anchored", "paper"] = "anchored"
+    estimate_focal: bool = False
 
 
 class Reconstruction:
     """From observations to shapes, frame by frame: bootstrap first, then a sliding window.
 
     Args:
-        camera: the camera; the paper's energy needs an orthographic one.
+        camera: the camera, its focal length perhaps only assumed; the paper's energy needs an orthographic one.
         settings: how to reconstruct.
         given: a rest shape (3, p) from elsewhere.
         mesh: its mesh, if it has one.
@@ -83,6 +69,7 @@ class Reconstruction:
         window: the sliding window, once there is a rest shape.
         bootstrap_frames: frames the bootstrap took.
         deformation: the constraint in force; auto until the rest shape decides.
+        focal_note: what the first frames say about the focal length, in words; empty if they were not asked.
     """
 
     def __init__(
@@ -96,6 +83,7 @@ class Reconstruction:
         self.window: SlidingWindow | None = None
         self.bootstrap_frames = 0
         self.deformation = settings.deformation
+        self.focal_note = ""
         self._waiting: list[tuple[Array, Visibility]] = []
 
     @property
@@ -109,6 +97,12 @@ class Reconstruction:
         if self.window is None:
             raise ReconstructionError("there is no rest shape yet: the bootstrap is not over")
         return self.window.model
+
+    @property
+    def focal_words(self) -> dict[str, float | str | None]:
+        """The focal length in force, None for an orthographic camera, and how it was found if it was looked for."""
+        note = {"focal_note": self.focal_note} if self.focal_note else {}
+        return {"focal_px": self.camera.focal_px if self.camera.perspective else None, **note}
 
     def predict(self) -> Array | None:
         """Where the next frame will see the points, (p, 2) px at constant velocity; None while bootstrapping."""
@@ -149,62 +143,38 @@ class Reconstruction:
         visible = np.stack([v for _, v in self._waiting])
         kind = self.settings.rest_shape
         if kind == "plane":
-            return self._start(rest_shape.plane(W, visible, self.camera))
+            return self._recover("plane", W, visible)
         if kind == "rigid" and self.settings.bootstrap_frames is not None:
-            return self._start(rest_shape.rigid(W, visible, self.camera))
+            return self._recover("rigid", W, visible)
         doubt = "there are too few frames for a rigid shape"
         if len(W) >= BOOTSTRAP_SCHEDULE[0]:
             doubt = rest_shape.weigh(W, visible).doubt
             if not doubt:
-                return self._start(rest_shape.rigid(W, visible, self.camera))
+                return self._recover("rigid", W, visible)
         if not last:
             return []
         if kind == "rigid":
             raise ReconstructionError(
                 f"cannot recover a rest shape: {doubt}; give one with --rest-shape plane or --rest-shape mesh.obj"
             )
-        flat = rest_shape.plane(W, visible, self.camera)
-        return self._start(replace(flat, note=f"{flat.note} (no rigid shape: {doubt})"))
+        return self._recover("plane", W, visible, f" (no rigid shape: {doubt})")
+
+    def _recover(self, kind: str, W: Array, visible: Visibility, remark: str = "") -> list[ShapeEstimate]:
+        """The rest shape of the first frames (F, 2, p), by the focal length that they hold."""
+        recovery = rest_shape.rigid if kind == "rigid" else rest_shape.plane
+        rest = recovery(W, visible, self.camera)
+        if self.settings.estimate_focal and self.camera.perspective:
+            found = focal.estimate(W, visible, self.camera, rest, self.deformation)
+            self.camera, self.focal_note = replace(self.camera, focal_px=found.focal_px), found.note
+            if found.known:
+                rest = recovery(W, visible, self.camera)
+        return self._start(replace(rest, note=rest.note + remark))
 
     def _start(self, rest: RestShape) -> list[ShapeEstimate]:
         self.rest, self.bootstrap_frames = rest, len(self._waiting)
-        if self.deformation == "auto":
-            self.deformation = "inextensible" if rest.flat else "general"
-        model = build_model(rest, self.camera, self.settings, self._mesh)
+        self.deformation = chosen(self.deformation, rest)
+        model = build_model(rest, self.camera, self.settings.modes, self.settings.metric, self._mesh)
         energy = build_energy(model, self.deformation, paper=self.settings.energy == "paper")
         self.window = SlidingWindow(model, energy, self.settings.window, rest.motion)
         waiting, self._waiting = self._waiting, []
         return [self.window.advance(W, visible) for W, visible in waiting]
-
-
-def build_model(rest: RestShape, camera: Camera, settings: Settings, mesh: Mesh | None) -> Model:
-    """Mesh and modes of a rest shape.
-
-    Raises:
-        ReconstructionError: more modes than the points carry.
-    """
-    shape = rest.motion.shape
-    if mesh is None:
-        mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
-        x, y = (rest.motion.R[0] @ shape)[:2]
-        a, b, c = mesh.faces.T
-        area = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a])
-        if area.sum() > 0:  # y points down: outward normals face the camera when the image winds the other way
-            mesh = mesh_from_faces(mesh.faces[:, ::-1])
-    return Model(modal_basis(shape, mesh, settings.modes, settings.metric), mesh, camera)
-
-
-def build_energy(model: Model, deformation: Deformation, *, paper: bool) -> Energy:
-    """The energy of a constraint on the deformation (paper §5, §3.4); `paper` as printed there."""
-    rows = ROWS[deformation]
-    if paper:
-        return Energy(rows=rows, rest=0.0, deformation=1e-3, free_scale=False, tied=False)
-    scale = PERSPECTIVE_SCALE if model.camera.perspective else ORTHOGRAPHIC_SCALE
-    # A mode's eigenvalue says how much of the shape's extent it carries: weak modes are pulled to rest harder.
-    stiffness = model.basis.eigenvalues**-0.5
-    stiffness /= np.exp(np.log(stiffness).mean())
-    rest, smooth = PULLS[deformation]
-    energy = Energy(scale=scale, deformation=smooth, rest=rest * stiffness, rows=rows)
-    if deformation == "inextensible":
-        return replace(energy, inextensibility=INEXTENSIBILITY, edges=model.coarse_edges())
-    return energy

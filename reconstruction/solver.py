@@ -60,7 +60,7 @@ def minimise(energy: Energy, data: Statistics, start: State, before: State | Non
         state, damping = trial, max(damping / 10, 1e-9)
         if settled:
             return Solution(state, value, steps)
-        normal = linearise(energy, data, state, before)
+        normal = linearise(energy, data, state, before, value)
     return Solution(state, normal.value, steps)
 
 

@@ -10,6 +10,7 @@ Lengths are in units of the rest shape's RMS radius and Υ' = √p Υ, so nothin
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,22 @@ class Statistics:
 
     def __len__(self) -> int:
         return len(self.power)
+
+    @cached_property
+    def form(self) -> Array:
+        """(n, 3K, 3K) matrix of the quadratic form in M, row after row."""
+        n, _, K, _ = self.gram.shape
+        form = np.zeros((n, 3, K, 3, K))
+        form[:, 0, :, 0] = form[:, 1, :, 1] = self.gram[:, 0]
+        form[:, 2, :, 2] = self.gram[:, 3]
+        for c in (0, 1):
+            form[:, c, :, 2] = form[:, 2, :, c] = -self.gram[:, 1 + c]
+        return form.reshape(n, 3 * K, 3 * K)
+
+    @cached_property
+    def linear(self) -> Array:
+        """(n, 3, K) half the linear part in M, negative."""
+        return np.asarray(self.cross * np.array([1.0, 1.0, -1.0])[:, None])
 
 
 def frame_statistics(basis: Array, W: Array, weights: Array, focal: float) -> Statistics:
@@ -85,23 +102,20 @@ def stack(parts: list[Statistics]) -> Statistics:
 
 def gradient(statistics: Statistics, M: Array) -> Array:
     """Half the derivative (n, 3, K) of the data terms with respect to M (n, 3, K)."""
-    product = apply(statistics.gram, M[:, None])[:, 0]
-    return np.asarray(product - statistics.cross * np.array([1.0, 1.0, -1.0])[:, None])
+    return np.asarray(apply(statistics, M[:, None])[:, 0] - statistics.linear)
 
 
-def apply(gram: Array, M: Array) -> Array:
+def apply(statistics: Statistics, M: Array) -> Array:
     """The quadratic form's matrix times M: (n, k, 3, K) for directions M (n, k, 3, K)."""
-    G0, Gx, Gy, G2 = (gram[:, None, i] for i in range(4))
-    x, y, z = (M[:, :, c, None, :] for c in range(3))
-    rows = [x @ G0 - z @ Gx, y @ G0 - z @ Gy, z @ G2 - x @ Gx - y @ Gy]
-    return np.concatenate(rows, axis=2)
+    return np.asarray((M.reshape(*M.shape[:2], -1) @ statistics.form).reshape(M.shape))
 
 
 def value(statistics: Statistics, M: Array) -> Array:
     """Data terms (n,): Σ_i h_i |ρ_i|² / p."""
-    linear = statistics.cross * np.array([1.0, 1.0, -1.0])[:, None]
-    quadratic = np.einsum("nck,nck->n", M, apply(statistics.gram, M[:, None])[:, 0] - 2 * linear)
-    return np.asarray(statistics.power + quadratic)
+    product = apply(statistics, M[:, None])[:, 0]
+    product -= 2 * statistics.linear
+    product *= M
+    return np.asarray(statistics.power + product.sum(axis=(1, 2)))
 
 
 def residuals(basis: Array, W: Array, M: Array, focal: float) -> Array:

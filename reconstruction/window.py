@@ -47,11 +47,13 @@ class SlidingWindow:
 
     Attributes:
         state: the window's frames; None before the first.
+        spent: energy of all frames so far, each when it was the newest.
     """
 
     def __init__(self, model: Model, energy: Energy, length: int, motion: RigidMotion) -> None:
         self.model = model
         self.state: State | None = None
+        self.spent = 0.0
         self._energy, self._length, self._motion = energy, length, motion
         self._before: State | None = None  # the frame that has left the window
         self._lost: State | None = None  # the last frame before everything started anew
@@ -80,6 +82,7 @@ class SlidingWindow:
             self._data[-1] = self.model.statistics(W, weights)
             found = self._adjust(found.state)
         newest = float(found.value[-1])
+        self.spent += newest
         self._usual = newest if np.isinf(self._usual) else 0.9 * self._usual + 0.1 * newest
         self.state = found.state
         return self.model.estimate(self._frame, W, visible, self.state)

@@ -6,9 +6,16 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+import app  # noqa: F401  # sets what Rerun reads when it is loaded
+
 # A busy machine is no reason to fail, and a red run must be red again when it is repeated.
 settings.register_profile("modeshape", deadline=None, derandomize=True, max_examples=40, database=None)
 settings.load_profile("modeshape")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """What Rerun only warns of is a mistake; said here, since settings read earlier would load Rerun before `app` does."""
+    config.addinivalue_line("filterwarnings", "error::rerun.error_utils.RerunWarning")
 
 
 @pytest.fixture(scope="session")

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction.camera import Camera, quaternion_exp, quaternion_product
+from reconstruction.constraints import ROWS
 from reconstruction.energy import Energy, State, join
 from reconstruction.mesh import Mesh, triangulate
 from reconstruction.model import Model
 from reconstruction.modes import modal_basis
-from reconstruction.online import ROWS
 from reconstruction.solver import Solver, minimise
 from reconstruction.statistics import Statistics, frame_statistics, stack
 

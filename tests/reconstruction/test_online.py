@@ -7,9 +7,10 @@ import pytest
 
 from reconstruction import ReconstructionError, rest_shape
 from reconstruction.camera import Camera
+from reconstruction.constraints import Deformation
 from reconstruction.evaluation import e3d
 from reconstruction.model import ShapeEstimate
-from reconstruction.online import Deformation, Phase, Reconstruction, Settings
+from reconstruction.online import Phase, Reconstruction, Settings
 from reconstruction.window import robust_weights
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, flat, relief, rolled, seen, turn, turns
 

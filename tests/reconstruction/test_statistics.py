@@ -73,7 +73,7 @@ def test_applied_matrix_is_the_second_derivative(rng: np.random.Generator, focal
     basis, W, M = scene(rng)
     data = frame_statistics(basis, W, weights_of(rng, W.shape[1]), focal)
     direction = rng.normal(size=M.shape)
-    curvature = (direction * statistics.apply(data.gram, direction[:, None])[:, 0]).sum()
+    curvature = (direction * statistics.apply(data, direction[:, None])[:, 0]).sum()
     along = [statistics.value(data, M + k * direction)[0] for k in (-1, 0, 1)]
     assert curvature == pytest.approx((along[0] - 2 * along[1] + along[2]) / 2, rel=1e-6, abs=1e-8)
 

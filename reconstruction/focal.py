@@ -1,0 +1,135 @@
+"""The focal length from the data: with the wrong one, the first frames cost more energy."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from reconstruction import rest_shape
+from reconstruction.camera import Camera
+from reconstruction.constraints import Deformation, build_energy, chosen
+from reconstruction.energy import Energy, join
+from reconstruction.model import Model, build_model
+from reconstruction.rest_shape import RestShape
+from reconstruction.solver import Solver, minimise
+from reconstruction.statistics import stack
+from reconstruction.window import SlidingWindow, robust_weights
+
+Array = NDArray[np.float64]
+Visibility = NDArray[np.bool_]
+
+FEWEST = 40  # frames; fewer show too little turn and bend
+FRAMES = 16  # of them, spread, are enough to compare by
+MODES = 20
+RATIOS = 2.0 ** np.array([-1.0, -0.5, 0.0, 0.5, 1.0])  # looked at first, of the focal length assumed so far
+SIDE = 2.0**0.5  # a focal length so much longer or shorter than the best ...
+RISE = 1.1  # ... must cost so many times more for the data to hold it
+PRECISION = 0.02  # of the focal length
+EVALUATIONS = 6  # most, between two ratios
+WINDOW = 3  # frames, for the first solution
+
+
+@dataclass(frozen=True)
+class FocalEstimate:
+    """What the first frames say about the focal length.
+
+    Attributes:
+        focal_px: the focal length to go on with.
+        known: whether the frames hold it; otherwise it is the one to start with.
+        note: how that was found, in words.
+    """
+
+    focal_px: float
+    known: bool
+    note: str
+
+
+def estimate(W: Array, visible: Visibility, camera: Camera, rest: RestShape, deformation: Deformation) -> FocalEstimate:
+    """The focal length that explains observations (F, 2, p) px with visibility (F, p) best.
+
+    Args:
+        W: (F, 2, p) px.
+        visible: (F, p).
+        camera: with the focal length assumed so far.
+        rest: the rest shape under that focal length, of which the pose in the first frame is believed.
+        deformation: the constraint on Λ.
+    """
+    if len(W) < FEWEST:
+        return FocalEstimate(camera.focal_px, False, assumed(camera.focal_px, f"{len(W)} frames are too few to tell"))
+    points = rest_shape.judging_points(W, visible)
+    frames = np.unique(np.linspace(0, len(W) - 1, FRAMES).astype(int))
+    motion = replace(rest.motion, shape=rest.motion.shape[:, points])
+    trials = Trials(W[frames][:, :, points], visible[frames][:, points], replace(rest, motion=motion), deformation, camera)
+    return search(trials.cost, camera.focal_px)
+
+
+class Trials:
+    """The same frames under one focal length after another, each starting from the solution of the nearest.
+
+    Args:
+        W: (F, 2, p) px, few frames and points.
+        visible: (F, p).
+        rest: as in `estimate`.
+        deformation: the constraint on Λ.
+        camera: as in `estimate`.
+    """
+
+    def __init__(self, W: Array, visible: Visibility, rest: RestShape, deformation: Deformation, camera: Camera) -> None:
+        self._W, self._visible, self._rest, self._camera = W, visible, rest, camera
+        self._deformation = chosen(deformation, rest)
+        model, energy = self._problem(camera.focal_px)
+        window = SlidingWindow(model, energy, WINDOW, rest.motion)
+        states, weights = [], []
+        for w, v in zip(W, visible, strict=True):
+            window.advance(w, v)
+            assert window.state is not None
+            states.append(window.state[-1:])
+            weights.append(robust_weights(model.residuals(w, window.state), v))
+        self._weights, self._solved = weights, {camera.focal_px: join(states)}
+
+    def cost(self, focal_px: float) -> float:
+        """Least energy of all frames together under a focal length, mean over frames."""
+        model, energy = self._problem(focal_px)
+        data = stack([model.statistics(w, weights) for w, weights in zip(self._W, self._weights, strict=True)])
+        nearest = min(self._solved, key=lambda other: abs(np.log(other / focal_px)))
+        found = minimise(energy, data, self._solved[nearest], None, Solver())
+        self._solved[focal_px] = found.state
+        return float(found.value.mean())
+
+    def _problem(self, focal_px: float) -> tuple[Model, Energy]:
+        camera, rest = replace(self._camera, focal_px=focal_px), self._rest
+        if rest.kind == "plane":
+            rest = rest_shape.plane(self._W, self._visible, camera)  # its tilt depends on the focal length
+        model = build_model(rest, camera, min(MODES, self._W.shape[2] - 1))
+        return model, build_energy(model, self._deformation)
+
+
+def search(cost: Callable[[float], float], start_px: float) -> FocalEstimate:
+    """The focal length of least energy within an octave of `start_px`, if the energy clearly rises on both sides.
+
+    Args:
+        cost: energy of the first frames under a focal length in pixels.
+        start_px: the focal length assumed so far, which stays where the data do not hold it.
+    """
+    outwards = sorted(RATIOS, key=lambda ratio: abs(np.log(ratio)))
+    costs = [spent for _, spent in sorted((ratio, cost(start_px * ratio)) for ratio in outwards)]
+    best = int(np.argmin(costs))
+    low, high = RATIOS[max(best - 1, 0)], RATIOS[min(best + 1, len(RATIOS) - 1)]
+    found = minimize_scalar(
+        lambda log_ratio: cost(start_px * np.exp(log_ratio)),
+        bounds=(np.log(low), np.log(high)),
+        method="bounded",
+        options={"xatol": PRECISION, "maxiter": EVALUATIONS},
+    )
+    focal_px = float(start_px * np.exp(found.x))
+    rise = min(cost(focal_px / SIDE), cost(focal_px * SIDE)) / max(float(found.fun), 1e-300)
+    if 0 < best < len(RATIOS) - 1 and rise > RISE:
+        return FocalEstimate(focal_px, True, f"focal length {focal_px:.0f} px, from the first frames")
+    return FocalEstimate(start_px, False, assumed(start_px, "the first frames do not hold it"))
+
+
+def assumed(focal_px: float, why: str) -> str:
+    """The words for a focal length that was not found."""
+    return f"focal length {focal_px:.0f} px assumed: {why}; give --focal if you know better"
