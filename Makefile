@@ -16,15 +16,18 @@ bench: .venv/ready
 	-PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,bench]'
 	$(BIN)/modeshape bench --plot recordings/bench.png --overwrite --readme README.md
 
+# Two at a time, file by file.
+PYTEST := -m pytest -n 2 --dist loadfile
+
 test: .venv/ready
-	$(BIN)/python -m pytest
+	$(BIN)/python $(PYTEST)
 
 test-slow: .venv/ready
 	$(BIN)/python -m pytest -m slow
 
 test-opencv4: .venv-opencv4/ready
 	$(BIN4)/python -c 'import cv2; assert cv2.__version__.startswith("4."), cv2.__version__'
-	$(BIN4)/python -m pytest tests/tracking tests/app/test_session.py tests/app/test_cli.py tests/app/test_errors.py
+	$(BIN4)/python $(PYTEST) tests/tracking tests/app/test_session.py tests/app/test_cli.py tests/app/test_errors.py
 
 lint: .venv/ready
 	$(BIN)/ruff check .

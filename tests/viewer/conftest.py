@@ -25,7 +25,7 @@ class Viewer:
     process: subprocess.Popen[bytes]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def viewer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Viewer]:
     with headless_viewer(tmp_path_factory.mktemp("viewer")) as viewer:
         yield viewer
