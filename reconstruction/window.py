@@ -27,6 +27,7 @@ ROBUST_SIGMAS = 8.0  # deviations from the model beyond which a point counts les
 GROSS_SIGMAS = 7.0  # deviations from the common motion beyond which a point is no sound start
 REWEIGHTINGS = 5  # most rounds of robust weights: one for clean points, more while gross outliers still pull
 REWEIGHTED = 0.005  # share of the weights that must change for another round
+CALM = 1e-5  # energy of a new frame (a misfit of 0.3 % of the size) that is no surprise whatever was usual
 SURPRISE = 2.0  # times the usual energy of a new frame, above which other bends are tried
 BENT_GAIN = 0.95  # of the window's energy, below which another bend is believed
 TILT_GAIN = 0.7  # of the first frame's energy, below which another tilt is believed
@@ -73,7 +74,7 @@ class SlidingWindow:
         found = self._adjust(window)
         if self._lost is not None:
             found, self._lost = min(found, self._adjust(self._lost), key=lambda one: float(one.value.sum())), None
-        if self._energy.edges is not None and found.value[-1] > SURPRISE * self._usual:
+        if self._energy.edges is not None and found.value[-1] > max(SURPRISE * self._usual, CALM):
             found = self._bent_otherwise(found)
         for _ in range(REWEIGHTINGS):
             before, weights = weights, robust_weights(self.model.residuals(W, found.state), visible)

@@ -70,7 +70,8 @@ def _both_ways(before: Image, now: Image, points: Array, guess: Array, window: i
 
 def _median_of_nearest(points: Array, guides: Array, motion: Array) -> Array:
     # One product instead of all differences; the points' own squares do not change the order.
-    distance = np.sum(guides**2, axis=1) - 2.0 * points @ guides.T
+    near = guides.astype(np.float32)
+    distance = np.sum(near**2, axis=1) - 2.0 * points.astype(np.float32) @ near.T
     nearest = np.argpartition(distance, VOTES - 1, axis=1)[:, :VOTES]
     median: Array = np.median(motion[nearest], axis=1)
     return median
