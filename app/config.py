@@ -23,7 +23,8 @@ class Model:
     modes: int = 20
     """Number of modes r."""
     deformation: Literal["auto", "bending", "stretching", "general", "inextensible"] = "auto"
-    """How the surface may deform; auto: inextensible for a flat rest shape, general for a solid one."""
+    """How the surface may deform; auto: general for a solid rest shape, inextensible for a flat one, bending for a flat one
+    seen by an orthographic camera."""
     window: int = 5
     """Frames adjusted together."""
     energy: Literal["anchored", "paper"] = "anchored"

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
-from typing import Literal, cast
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -11,13 +10,14 @@ from threadpoolctl import threadpool_limits
 from app.config import Evaluate, Words
 from app.errors import UsageError
 from app.mesh_file import rest_of_vertices
+from app.prepare import RECOVERED, settings_of
 from app.progress import Progress
 from app.results import Collected, check_free, save_shapes, score_words
 from reconstruction import rest_shape
 from reconstruction.camera import Camera
 from reconstruction.evaluation import score, with_missing, with_noise, with_outliers
 from reconstruction.mesh import Mesh
-from reconstruction.online import Reconstruction, Settings
+from reconstruction.online import Reconstruction
 from reconstruction.rest_shape import RestShape
 from tracking.tracks import Tracks
 
@@ -82,18 +82,7 @@ def prepare(config: Evaluate, tracks: Tracks) -> Reconstruction:
         UsageError: no such rest shape or camera in the file.
     """
     given, mesh = given_rest_shape(config, tracks)
-    choice = config.rest_shape if given is None else "auto"
-    model = config.model
-    settings = Settings(
-        rest_shape=cast(Literal["auto", "rigid", "plane"], choice),
-        bootstrap_frames=None if model.bootstrap_frames == "auto" else model.bootstrap_frames,
-        modes=model.modes,
-        metric=model.metric,
-        deformation=model.deformation,
-        window=model.window,
-        energy=model.energy,
-        estimate_focal=model.focal == "auto",
-    )
+    settings = settings_of(config.model, config.rest_shape)
     return Reconstruction(camera_of(config, tracks), settings, given, mesh)
 
 
@@ -103,7 +92,7 @@ def given_rest_shape(config: Evaluate, tracks: Tracks) -> tuple[RestShape | None
     Raises:
         UsageError: the file has no truth, or the mesh does not fit.
     """
-    if config.rest_shape in ("auto", "rigid", "plane"):
+    if config.rest_shape in RECOVERED:
         return None, None
     if config.rest_shape == "first-truth":
         if tracks.S_gt is None:

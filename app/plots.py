@@ -10,6 +10,7 @@ from matplotlib.colors import AsinhNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from app.chart_style import STYLE
 from app.errors import UsageError
 from app.measures import Reviewed, phase_ranges
 
@@ -34,28 +35,7 @@ def check_format(path: Path) -> None:
 
 def write_review(file: BinaryIO, suffix: str, reviewed: list[Reviewed]) -> None:
     """Draw one recording, or two for comparison, in the format of a file suffix."""
-    with mpl.rc_context(
-        {
-            "font.size": 8,
-            "axes.titlesize": 8.5,
-            "axes.titlelocation": "left",
-            "axes.titleweight": "bold",
-            "axes.labelsize": 8,
-            "axes.spines.top": False,
-            "axes.spines.right": False,
-            "axes.linewidth": 0.6,
-            "axes.grid": True,
-            "axes.axisbelow": True,
-            "grid.linewidth": 0.4,
-            "grid.color": "#dddddd",
-            "legend.frameon": False,
-            "legend.fontsize": 7.5,
-            "lines.linewidth": 1.1,
-            "xtick.labelsize": 7.5,
-            "ytick.labelsize": 7.5,
-            "svg.fonttype": "none",
-        }
-    ):
+    with mpl.rc_context({**STYLE, "lines.linewidth": 1.1, "svg.fonttype": "none"}):
         figure = review_figure(reviewed)
         figure.savefig(file, format=suffix.lower().lstrip("."), dpi=DPI)
 

@@ -1,15 +1,11 @@
 """The frame loop: read, track, reconstruct, record."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from time import perf_counter
-from typing import Literal, cast
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from app.ahead import Ahead
@@ -19,22 +15,19 @@ from app.compositing import Laid, painted
 from app.config import Run, Words, as_words
 from app.errors import UsageError
 from app.interrupts import completed
-from app.mesh_file import rest_of_surface
 from app.observer import Followed, Observer
 from app.parts import RECORDINGS, Parts, free_name
+from app.prepare import prepared
 from app.progress import Progress
 from app.recording import Recording
 from app.results import Collected, check_free, save_shapes, score_words
 from app.stopwatch import Stopwatch
 from app.tally import Tally
 from reconstruction import ReconstructionError
-from reconstruction.camera import Camera
 from reconstruction.model import ShapeEstimate
-from reconstruction.online import Phase, Reconstruction, Settings
-from tracking.features import detect_corners
+from reconstruction.online import Phase
 from tracking.guarded import Change, Guarded, GuardedTracker
 from tracking.klt import Observation
-from tracking.region import region_mask
 from tracking.tracks import Tracks, Truth
 from tracking.video import Frame, Video
 
@@ -89,7 +82,8 @@ class Session:
                 raise UsageError(
                     f"{config.source} gives only one frame: a shape shows in how it moves; give a video, or more --frames"
                 )
-            self._start(first, video)
+            self._first, self._fps, self._size = first, video.fps, video.size
+            self._points_px, self._reconstruction = prepared(config, first)
             path = config.output.out
             if path is None and self._observer is None:
                 path = free_name(RECORDINGS, config.source)
@@ -126,33 +120,6 @@ class Session:
         """What the source has to say, in its own thread."""
         self._progress.say(text)
         self._heard.append(text)
-
-    def _start(self, first: Frame, video: Video) -> None:
-        """Corners of the first frame, and the camera they are seen by."""
-        config = self._config
-        region = region_mask(video.size, config.roi, config.mask)
-        gray = cast(NDArray[np.uint8], cv2.cvtColor(first.image, cv2.COLOR_BGR2GRAY))
-        points_px = detect_corners(gray, region, config.points)
-        width, height = video.size
-        focal = config.model.focal if isinstance(config.model.focal, float) else float(width)
-        camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
-        settings = Settings(
-            modes=config.model.modes,
-            metric=config.model.metric,
-            deformation=config.model.deformation,
-            window=config.model.window,
-            energy=config.model.energy,
-            estimate_focal=config.model.focal == "auto",
-            bootstrap_frames=None if config.model.bootstrap_frames == "auto" else config.model.bootstrap_frames,
-        )
-        if config.rest_shape in ("auto", "rigid", "plane"):
-            settings = replace(settings, rest_shape=cast(Literal["auto", "rigid", "plane"], config.rest_shape))
-            self._reconstruction = Reconstruction(camera, settings)
-        else:
-            given, inside = rest_of_surface(Path(config.rest_shape), points_px, camera)
-            points_px = points_px[inside]
-            self._reconstruction = Reconstruction(camera, settings, given)
-        self._first, self._points_px, self._fps, self._size = first, points_px, video.fps, video.size
 
     def _loop(self, first: Frame, frames: Iterator[Frame]) -> None:
         with self._watch.time("track"):

@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from reconstruction.camera import Camera
 from reconstruction.energy import Energy
 from reconstruction.model import Model
 from reconstruction.rest_shape import RestShape
@@ -27,11 +28,17 @@ PULLS: dict[str, tuple[float, float]] = {
 INEXTENSIBILITY = 3.0  # κ
 
 
-def chosen(deformation: Deformation, rest: RestShape) -> Deformation:
-    """The constraint itself for `auto`: a sheet keeps its lengths, a solid may do anything."""
+def chosen(deformation: Deformation, rest: RestShape, camera: Camera) -> Deformation:
+    """The constraint itself for `auto`: a solid may do anything, a sheet keeps its lengths.
+
+    An orthographic camera sees a bend and its mirror image alike: there lengths would be kept by either, and now and then
+    the wrong one is taken for good; bending alone stays on its side.
+    """
     if deformation != "auto":
         return deformation
-    return "inextensible" if rest.flat else "general"
+    if not rest.flat:
+        return "general"
+    return "inextensible" if camera.perspective else "bending"
 
 
 def build_energy(model: Model, deformation: Deformation, *, paper: bool = False) -> Energy:

@@ -78,7 +78,7 @@ class Trials:
 
     def __init__(self, W: Array, visible: Visibility, rest: RestShape, deformation: Deformation, camera: Camera) -> None:
         self._W, self._visible, self._rest, self._camera = W, visible, rest, camera
-        self._deformation = chosen(deformation, rest)
+        self._deformation = chosen(deformation, rest, camera)
         model, energy = self._problem(camera.focal_px)
         window = SlidingWindow(model, energy, WINDOW, rest.motion)
         states, weights = [], []

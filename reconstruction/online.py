@@ -172,7 +172,7 @@ class Reconstruction:
 
     def _start(self, rest: RestShape) -> list[ShapeEstimate]:
         self.rest, self.bootstrap_frames = rest, len(self._waiting)
-        self.deformation = chosen(self.deformation, rest)
+        self.deformation = chosen(self.deformation, rest, self.camera)
         model = build_model(rest, self.camera, self.settings.modes, self.settings.metric, self._mesh)
         energy = build_energy(model, self.deformation, paper=self.settings.energy == "paper")
         self.window = SlidingWindow(model, energy, self.settings.window, rest.motion)

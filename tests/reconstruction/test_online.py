@@ -92,6 +92,13 @@ def test_auto_takes_a_sheet_for_inextensible() -> None:
     assert error(estimates, truth) < 0.5 * static_error(reconstruction, truth)
 
 
+def test_auto_only_bends_a_sheet_whose_depth_sign_is_open() -> None:
+    W, truth = bending_sheet(ORTHOGRAPHIC)
+    reconstruction, estimates = reconstruct(W, ORTHOGRAPHIC, truth=truth)
+    assert reconstruction.deformation == "bending"
+    assert error(estimates, truth) < static_error(reconstruction, truth)
+
+
 def test_a_solid_is_factorised_then_deformed() -> None:
     W, truth = swelling_hill(ORTHOGRAPHIC)
     settings = replace(SETTINGS, rest_shape="rigid", bootstrap_frames=12)
