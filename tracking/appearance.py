@@ -12,6 +12,7 @@ Patches = NDArray[np.float32]
 Indices = NDArray[np.int64]
 
 MAX_STEP = 2.0  # patch pixels; beyond, the linear model of the patch does not hold
+SETTLED = 0.05  # patch pixels; after a shorter step a point is where it belongs
 FLAT = 1e-3  # grey levels of contrast below which a patch has no appearance
 
 
@@ -48,7 +49,8 @@ class Appearance:
         self._grid = np.stack([u.ravel(), v.ravel(), np.ones(u.size, np.float32)])
         upright = np.broadcast_to(np.eye(2), (len(points_px), 2, 2))
         patches = _sample(image, points_px, upright, self._grid)
-        self._patches, contrast = _normalised(patches)
+        contrast = _centre(patches)
+        patches /= contrast
         gradients = [
             (_sample(image, points_px + step, upright, self._grid) - _sample(image, points_px - step, upright, self._grid))
             / (2.0 * contrast)
@@ -56,9 +58,10 @@ class Appearance:
         ]
         # The part of the gradients that gain and offset cannot explain.
         gradients = [g - g.mean(axis=1, keepdims=True) for g in gradients]
-        gradients = [g - _dot(g, self._patches)[:, None] * self._patches for g in gradients]
-        self._gradients = np.stack(gradients, axis=1)
-        normal = (self._gradients @ np.swapaxes(self._gradients, 1, 2)).astype(np.float64)
+        gradients = [g - _dot(g, patches)[:, None] * patches for g in gradients]
+        # All are free of offset, and the gradients of the patch: one product with what is seen gives score and slope.
+        self._templates = np.stack([patches, *gradients], axis=1)
+        normal = (self._templates[:, 1:] @ np.swapaxes(self._templates[:, 1:], 1, 2)).astype(np.float64)
         normal[:, (0, 1), (0, 1)] += 1e-3 * np.trace(normal, axis1=1, axis2=2)[:, None] + 1e-9
         self._inverse = np.linalg.inv(normal)
 
@@ -70,23 +73,30 @@ class Appearance:
             points_px: (n, 2) first guesses.
             affine: (n, 2, 2) maps from the patch to the picture.
             which: (n,) the points' indices.
-            iterations: steps taken; with 0 the guesses are only scored.
+            iterations: most steps taken; with 0 the guesses are only scored.
         """
         points = points_px.copy()
-        patches, gradients, inverse = self._patches[which], self._gradients[which], self._inverse[which]
-        seen = self._seen(image, points, affine)
-        before = score = _dot(seen, patches).astype(np.float64)
+        score, slope = self._compare(image, points, affine, which)
+        before = score.copy()
+        moving = np.arange(len(which))
         for _ in range(iterations):
-            slope = np.einsum("nkm,nm->nk", gradients, seen - patches).astype(np.float64)
-            step = (inverse @ slope[:, :, None])[:, :, 0]
-            step /= np.maximum(1.0, np.linalg.norm(step, axis=1, keepdims=True) / MAX_STEP)
-            points -= (affine @ step[:, :, None])[:, :, 0]
-            seen = self._seen(image, points, affine)
-            score = _dot(seen, patches).astype(np.float64)
+            step = (self._inverse[which[moving]] @ slope[:, :, None])[:, :, 0]
+            length = np.linalg.norm(step, axis=1)
+            step /= np.maximum(1.0, length / MAX_STEP)[:, None]
+            points[moving] -= (affine[moving] @ step[:, :, None])[:, :, 0]
+            moving = moving[length > SETTLED]  # a shorter step changes neither score nor slope
+            if len(moving) == 0:
+                break
+            score[moving], slope = self._compare(image, points[moving], affine[moving], which[moving])
         return Alignment(points, score, before)
 
-    def _seen(self, image: Patches, points: Array, affine: Array) -> Patches:
-        return _normalised(_sample(image, points, affine, self._grid))[0]
+    def _compare(self, image: Patches, points: Array, affine: Array, which: Indices) -> tuple[Array, Array]:
+        """Score (n,) and half its falling slope (n, 2) where the picture is sampled for the points `which`."""
+        seen = _sample(image, points, affine, self._grid)
+        contrast = _centre(seen)
+        templates = self._templates if len(which) == len(self._templates) else self._templates[which]
+        products = ((templates @ seen[:, :, None])[:, :, 0] / contrast).astype(np.float64)
+        return products[:, 0], products[:, 1:]
 
 
 def _sample(image: Patches, centres: Array, affine: Array, grid: Patches) -> Patches:
@@ -98,11 +108,10 @@ def _sample(image: Patches, centres: Array, affine: Array, grid: Patches) -> Pat
     return cast(Patches, cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
 
 
-def _normalised(patches: Patches) -> tuple[Patches, Patches]:
-    """Patches of zero mean and unit norm, and the norms (n, 1)."""
-    centred = patches - patches.mean(axis=1, keepdims=True)
-    norm = np.maximum(np.sqrt(_dot(centred, centred)), FLAT)[:, None]
-    return centred / norm, norm
+def _centre(patches: Patches) -> Patches:
+    """Make the mean of each patch (n, m) zero, in place; their norms (n, 1)."""
+    patches -= patches.mean(axis=1, keepdims=True)
+    return np.maximum(np.sqrt(_dot(patches, patches)), FLAT)[:, None]
 
 
 def _dot(a: Patches, b: Patches) -> Patches:

@@ -28,12 +28,110 @@ class LocalMotion:
         fitted_px: (P, 2) where the neighbours say the point is, without asking the point itself.
         support: (P,) sum of the neighbours' weights.
         consistent: (P,) whether the point is where its neighbours say, or nothing can be said.
+        trust: (P,) what each point's word counts in the end.
+        scale_px: usual disagreement.
     """
 
     affine: Array
     fitted_px: Array
     support: Array
     consistent: Flags
+    trust: Array
+    scale_px: float
+
+
+class Surroundings:
+    """The neighbours of the points of a reference frame, and how they move together.
+
+    Args:
+        reference_px: (P, 2) points in the reference frame.
+
+    Attributes:
+        neighbours: (P, k) of `nearest_neighbours`.
+    """
+
+    def __init__(self, reference_px: Array) -> None:
+        self.neighbours = nearest_neighbours(reference_px)
+        self._reference = reference_px
+        # Neighbours come first, points last: sums over neighbours then run along the points in memory.
+        self._columns = np.ascontiguousarray(self.neighbours.T)
+        x, y = (column[self._columns] - column for column in reference_px.T)
+        self._offsets = np.stack([x, y, x * x, x * y, y * y], axis=1)
+        self._limit = CHAOS * float(np.median(np.hypot(x, y).max(axis=0, initial=0.0)))
+
+    def motion(self, current_px: Array, weight: Array, prior: Array) -> LocalMotion:
+        """Robust local affine maps from the reference to now; points that disagree lose their say.
+
+        Args:
+            current_px: (P, 2) the points now; NaN where unknown.
+            weight: (P,) confidence in `current_px`, 0 where unknown.
+            prior: (P, 2, 2) maps to fall back on where neighbours are few or in line.
+        """
+        moved = np.where(weight > 0, (current_px - self._reference).T, 0.0)
+        products = self._products(moved, slice(None))
+        # By what is known, not by what is trusted: else a gross outlier that upsets its neighbours is excused.
+        support = weight[self._columns].sum(axis=0)
+        judged = (weight > 0) & (support >= MIN_SUPPORT)
+        trust = weight
+        for _ in range(ROUNDS):
+            affine, fitted = self._fit(products, trust, prior, slice(None))
+            residual = np.hypot(*(moved - fitted))
+            scale = NOISE_PX
+            if judged.any():
+                scale = max(scale, min(1.4826 * float(np.median(residual[judged])), self._limit))
+            before, trust = trust, np.where(judged, weight / (1.0 + (residual / (2.0 * scale)) ** 2), weight)
+            if np.abs(trust - before).max(initial=0.0) < SETTLED:
+                break
+        consistent = ~judged | (residual < OUTLIER * scale)
+        return LocalMotion(affine, self._reference + fitted.T, support, consistent, trust, scale)
+
+    def agree(self, current_px: Array, which: Indices, motion: LocalMotion) -> Flags:
+        """Whether points found since move like their neighbours, each other included: (n,), also if nothing can be said.
+
+        Args:
+            current_px: (P, 2) the points now, NaN where unknown.
+            which: (n,) indices of those found since.
+            motion: of the others.
+        """
+        known = np.isfinite(current_px[:, 0])
+        moved = np.where(known, (current_px - self._reference).T, 0.0)
+        trust = np.where(known, motion.trust, 0.0)
+        trust[which] = 1.0
+        products, prior = self._products(moved, which), motion.affine[which]
+        judged = known[self._columns[:, which]].sum(axis=0) >= MIN_SUPPORT
+        for _ in range(ROUNDS):
+            _, fitted = self._fit(products, trust, prior, which)
+            residual = np.hypot(*(moved[:, which] - fitted))
+            before, now = trust[which], np.where(judged, 1.0 / (1.0 + (residual / (2.0 * motion.scale_px)) ** 2), 1.0)
+            trust[which] = now
+            if np.abs(now - before).max(initial=0.0) < SETTLED:
+                break
+        return np.asarray(~judged | (residual < OUTLIER * motion.scale_px))
+
+    def _products(self, moved: Array, rows: slice | Indices) -> Array:
+        """What the sums of a fit are taken of: (k, 11, n) for displacements (2, P)."""
+        columns, offsets = self._columns[:, rows], self._offsets[:, :, rows]
+        u, v = moved[0][columns], moved[1][columns]
+        x, y = offsets[:, 0], offsets[:, 1]
+        return np.concatenate([offsets, np.stack([u, v, x * u, y * u, x * v, y * v], axis=1)], axis=1)
+
+    def _fit(self, products: Array, trust: Array, prior: Array, rows: slice | Indices) -> tuple[Array, Array]:
+        """Weighted least squares of each neighbourhood about its centroid: maps (n, 2, 2), displacements (2, n)."""
+        w = trust[self._columns[:, rows]]
+        w /= np.maximum(w.sum(axis=0), 1e-9)
+        x, y, xx, xy, yy, u, v, xu, yu, xv, yv = np.einsum("kn,kfn->fn", w, products)
+        xx, xy, yy = xx - x * x, xy - x * y, yy - y * y
+        pull = STIFFNESS * (xx + yy) + 1e-6
+        px, py = xx + pull, yy + pull
+        determinant = px * py - xy * xy
+        affine, fitted = np.empty_like(prior), np.empty((2, len(prior)))
+        for row, (d, xd, yd, straight) in enumerate(((u, xu, yu, (xx, xy)), (v, xv, yv, (xy, yy)))):
+            mx = straight[0] + xd - x * d + pull * prior[:, row, 0]
+            my = straight[1] + yd - y * d + pull * prior[:, row, 1]
+            a, b = (mx * py - my * xy) / determinant, (my * px - mx * xy) / determinant
+            affine[:, row, 0], affine[:, row, 1] = a, b
+            fitted[row] = d + (x, y)[row] - a * x - b * y
+        return affine, fitted
 
 
 def nearest_neighbours(points_px: Array, count: int = NEIGHBOURS) -> Indices:
@@ -48,65 +146,3 @@ def nearest_neighbours(points_px: Array, count: int = NEIGHBOURS) -> Indices:
         order = np.argsort(np.take_along_axis(distance, nearest, axis=1), axis=1)
         rows.append(np.take_along_axis(nearest, order, axis=1)[:, 1:])
     return np.concatenate(rows).astype(np.int64)
-
-
-def local_motion(reference_px: Array, current_px: Array, weight: Array, neighbours: Indices, prior: Array) -> LocalMotion:
-    """Robust local affine maps from the reference to now; points that disagree lose their say.
-
-    Args:
-        reference_px: (P, 2) points in the reference frame.
-        current_px: (P, 2) the same now; NaN where unknown.
-        weight: (P,) confidence in `current_px`, 0 where unknown.
-        neighbours: (P, k) of `nearest_neighbours`.
-        prior: (P, 2, 2) maps to fall back on where neighbours are few or in line.
-    """
-    known = np.where(weight[:, None] > 0, current_px, 0.0)
-    # By what is known, not by what is trusted: else a gross outlier that upsets its neighbours is excused.
-    support = weight[neighbours].sum(axis=1)
-    judged = (weight > 0) & (support >= MIN_SUPPORT)
-    limit = CHAOS * _reach(reference_px, neighbours)
-    trust = weight
-    for _ in range(ROUNDS):
-        affine, fitted = _fit(reference_px, known, trust, neighbours, prior)
-        residual = np.linalg.norm(known - fitted, axis=1)
-        scale = NOISE_PX
-        if judged.any():
-            scale = max(scale, min(1.4826 * float(np.median(residual[judged])), limit))
-        before, trust = trust, np.where(judged, weight / (1.0 + (residual / (2.0 * scale)) ** 2), weight)
-        if np.abs(trust - before).max(initial=0.0) < SETTLED:
-            break
-    return LocalMotion(affine, fitted, support, ~judged | (residual < OUTLIER * scale))
-
-
-def _reach(reference: Array, neighbours: Indices) -> float:
-    """Median distance of the farthest neighbour."""
-    distance = np.linalg.norm(reference[neighbours] - reference[:, None], axis=2)
-    return float(np.median(distance.max(axis=1, initial=0.0)))
-
-
-def _fit(reference: Array, current: Array, weight: Array, neighbours: Indices, prior: Array) -> tuple[Array, Array]:
-    """Weighted least squares of each neighbourhood about its centroid: maps and predictions."""
-    w = weight[neighbours]
-    w /= np.maximum(w.sum(axis=1), 1e-9)[:, None]
-    # By coordinate, not by 2x2 matrices: stacks of tiny products cost NumPy several times as much.
-    coordinates = [column[neighbours] for column in (*reference.T, *current.T)]
-    means = [_rows(w, c) for c in coordinates]
-    x, y, u, v = (c - mean[:, None] for c, mean in zip(coordinates, means, strict=True))
-    wx, wy = w * x, w * y
-    xx, xy, yy = _rows(wx, x), _rows(wx, y), _rows(wy, y)
-    pull = STIFFNESS * (xx + yy) + 1e-6
-    xx, yy = xx + pull, yy + pull
-    determinant = xx * yy - xy * xy
-    affine = np.empty_like(prior)
-    for row, moved in enumerate((u, v)):
-        mx = _rows(wx, moved) + pull * prior[:, row, 0]
-        my = _rows(wy, moved) + pull * prior[:, row, 1]
-        affine[:, row, 0] = (mx * yy - my * xy) / determinant
-        affine[:, row, 1] = (my * xx - mx * xy) / determinant
-    offset = reference - np.stack(means[:2], axis=1)
-    return affine, np.stack(means[2:], axis=1) + np.einsum("nij,nj->ni", affine, offset)
-
-
-def _rows(a: Array, b: Array) -> Array:
-    product: Array = np.einsum("ij,ij->i", a, b)
-    return product

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking.appearance import Appearance
-from tracking.consistency import MIN_SUPPORT, LocalMotion, local_motion, nearest_neighbours
+from tracking.consistency import MIN_SUPPORT, LocalMotion, Surroundings
 from tracking.flow import follow, spread_order
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ class PointTracker:
         self._gray = cast(Image, gray)
         self._reference = points_px.astype(np.float64)
         self._order = spread_order(self._reference)
-        self._neighbours = nearest_neighbours(self._reference)
+        self._surroundings = Surroundings(self._reference)
         fine, coarse = _pictures(self._gray)
         self._fine = Appearance(fine, self._reference, PATCH_RADIUS)
         self._coarse = Appearance(coarse, self._reference / 2.0, PATCH_RADIUS)
@@ -138,7 +138,7 @@ class PointTracker:
             helped = (weight == 0) & np.isfinite(predicted_px[:, 0])
             points = np.where(helped[:, None], predicted_px, points)
             weight[helped] = PREDICTION_WEIGHT
-        return local_motion(self._reference, points, weight, self._neighbours, self._affine)
+        return self._surroundings.motion(points, weight, self._affine)
 
     def _refine(self, fine: Picture, coarse: Picture, points: Array, motion: LocalMotion) -> Array:
         """Remove the drift of tracked points; drop those that look different."""
@@ -184,8 +184,9 @@ class PointTracker:
         known = np.isfinite(miss[:, 0])
         if not known.any():
             return np.zeros_like(points)
-        seen = known[self._neighbours]
-        local = np.where(seen[:, :, None], miss[self._neighbours], 0.0).sum(axis=1)
+        neighbours = self._surroundings.neighbours
+        seen = known[neighbours]
+        local = np.where(seen[:, :, None], miss[neighbours], 0.0).sum(axis=1)
         count = seen.sum(axis=1)[:, None]
         return np.where(count > 0, local / np.maximum(count, 1), np.median(miss[known], axis=0))
 
@@ -200,9 +201,9 @@ class PointTracker:
         near = np.linalg.norm(found.points_px - expected[sought], axis=1) < RETRIEVE_PX
         good = near & (np.maximum(found.score, rough.score) > RETRIEVE_SCORE)
         points = points.copy()
-        points[sought[good]] = found.points_px[good]
-        agreed = self._motion(points, None).consistent
-        points[sought[~agreed[sought]]] = np.nan
+        sought = sought[good]
+        points[sought] = found.points_px[good]
+        points[sought[~self._surroundings.agree(points, sought, motion)]] = np.nan
         return points
 
 

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracking.consistency import local_motion, nearest_neighbours
+from tracking.consistency import Surroundings, nearest_neighbours
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -44,13 +44,7 @@ def test_an_affine_motion_is_recovered(seed: int) -> None:
     rng = np.random.default_rng(seed)
     A, t = np.eye(2) + 0.4 * rng.uniform(-1, 1, (2, 2)), rng.uniform(-50, 50, 2)
     points = grid()
-    motion = local_motion(
-        points,
-        points @ A.T + t,
-        np.ones(len(points)),
-        nearest_neighbours(points),
-        np.tile(A, (len(points), 1, 1)),
-    )
+    motion = Surroundings(points).motion(points @ A.T + t, np.ones(len(points)), np.tile(A, (len(points), 1, 1)))
     np.testing.assert_allclose(motion.affine, identity(len(points)) * 0 + A, atol=1e-6)
     np.testing.assert_allclose(motion.fitted_px, points @ A.T + t, atol=1e-5)
     assert motion.consistent.all()
@@ -64,7 +58,7 @@ def test_scattered_outliers_are_told_from_a_bent_surface(seed: int, share: float
     wrong = rng.random(len(points)) < share
     angle = rng.uniform(0, 2 * np.pi, int(wrong.sum()))
     now[wrong] += rng.uniform(5, 40, (len(angle), 1)) * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    motion = local_motion(points, now, np.ones(len(points)), nearest_neighbours(points), identity(len(points)))
+    motion = Surroundings(points).motion(now, np.ones(len(points)), identity(len(points)))
     assert np.count_nonzero(motion.consistent[wrong]) <= 0.2 * np.count_nonzero(wrong)
     assert motion.consistent[~wrong].mean() > 0.97
 
@@ -74,7 +68,7 @@ def test_unknown_points_are_placed_by_their_neighbours() -> None:
     rng = np.random.default_rng(1)
     known = rng.random(len(points)) < 0.6
     now = np.where(known[:, None], bent(points), np.nan)
-    motion = local_motion(points, now, known.astype(float), nearest_neighbours(points), identity(len(points)))
+    motion = Surroundings(points).motion(now, known.astype(float), identity(len(points)))
     assert np.isfinite(motion.fitted_px).all()
     supported = ~known & (motion.support >= 4)
     error = np.linalg.norm(motion.fitted_px - bent(points), axis=1)
@@ -85,7 +79,7 @@ def test_unknown_points_are_placed_by_their_neighbours() -> None:
 def test_without_support_nothing_is_said() -> None:
     points = np.array([[0.0, 0.0], [10.0, 0.0], [0.0, 10.0]])
     for weight in (np.ones(3), np.zeros(3)):
-        motion = local_motion(points, points + 100.0, weight, nearest_neighbours(points), identity(3))
+        motion = Surroundings(points).motion(points + 100.0, weight, identity(3))
         assert motion.consistent.all()
         assert np.isfinite(motion.affine).all()
 
@@ -93,6 +87,6 @@ def test_without_support_nothing_is_said() -> None:
 def test_neighbours_in_line_fall_back_on_the_prior() -> None:
     points = np.stack([np.arange(20.0) * 5, np.zeros(20)], axis=1)
     prior = np.tile([[1.0, 0.3], [0.0, 0.7]], (20, 1, 1))
-    motion = local_motion(points, points * 2, np.ones(20), nearest_neighbours(points), prior)
+    motion = Surroundings(points).motion(points * 2, np.ones(20), prior)
     np.testing.assert_allclose(motion.affine[:, :, 1], prior[:, :, 1], atol=1e-6)
     np.testing.assert_allclose(motion.affine[:, 0, 0], 2.0, atol=0.05)
