@@ -1,8 +1,12 @@
 """Optical flow of points, forward and backward, led by a few well-spread guides."""
 
+from dataclasses import dataclass
+from typing import cast
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -11,12 +15,34 @@ Flags = NDArray[np.bool_]
 
 WINDOW_PX = 15
 # The guides find the motion, the others only refine it. With all points on all levels, 21 % of kinect_paper's
-# fail between frames 60 and 61 (its texture repeats), in 20 ms; led by guides, none, in 8 ms (one core).
+# fail between frames 60 and 61 (its texture repeats), in 20 ms; led by guides, none, in 8 ms (one core). Guides are
+# followed in the half picture, which is as good a guide at a quarter of the cost.
 GUIDES = 150
-GUIDE_WINDOW_PX = 21
-GUIDE_LEVELS = 4  # halvings of a picture 640 px wide
+GUIDE_WINDOW_PX = 11  # of the half picture
+GUIDE_LEVELS = 3  # halvings of a half picture 320 px wide
 VOTES = 8  # guides whose median motion a point starts from
 RETURN_PX = 1.0  # forward and backward again must end so near to the start
+SETTLED_PX, RETURN_SETTLED_PX = 0.03, 0.1  # shorter steps end the search; what is found is aligned to its appearance later
+MOST_STEPS = 30
+
+
+@dataclass(frozen=True)
+class Grays:
+    """A picture to follow points through.
+
+    Attributes:
+        full: (H, W) uint8.
+        half: half its size.
+    """
+
+    full: Image
+    half: Image
+
+    @classmethod
+    def of(cls, image_bgr: Image) -> "Grays":
+        """Of a picture (H, W, 3) uint8."""
+        gray = cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)
+        return cls(cast(Image, gray), cast(Image, cv2.pyrDown(gray)))
 
 
 def spread_order(points_px: Array) -> Indices:
@@ -30,48 +56,61 @@ def spread_order(points_px: Array) -> Indices:
     return order
 
 
-def follow(before: Image, now: Image, points_px: Array) -> Array:
+def follow(before: Grays, now: Grays, points_px: Array) -> Array:
     """Where points went from one picture to the next: (n, 2), NaN where they did not come back.
 
     Args:
-        before: (H, W) uint8 picture.
-        now: (H, W) uint8 picture after it.
+        before: a picture.
+        now: the picture after it, of the same size.
         points_px: (n, 2) points in the first, in `spread_order`: the first `GUIDES` lead.
     """
     if len(points_px) == 0:  # OpenCV raises
         return np.empty((0, 2))
     guides = points_px[:GUIDES]
-    levels = GUIDE_LEVELS + max(0, round(np.log2(max(now.shape) / 640.0)))
-    moved, good = _both_ways(before, now, guides, np.zeros_like(guides), GUIDE_WINDOW_PX, levels)
-    motion = (moved - guides)[good]
+    levels = GUIDE_LEVELS + max(0, round(np.log2(max(now.half.shape) / 320.0)))
+    moved, good = both_ways(before.half, now.half, guides / 2, np.zeros_like(guides), GUIDE_WINDOW_PX, levels)
+    motion = (2 * moved - guides)[good]
     if len(motion) < VOTES:
         guess = np.zeros_like(points_px)
+        levels += 1
     else:
         guess = _median_of_nearest(points_px, guides[good], motion)
         levels = 0
-    there, good = _both_ways(before, now, points_px, guess, WINDOW_PX, levels)
+    there, good = both_ways(before.full, now.full, points_px, guess, WINDOW_PX, levels)
     there[~good] = np.nan
     return there
 
 
-def _both_ways(before: Image, now: Image, points: Array, guess: Array, window: int, levels: int) -> tuple[Array, Flags]:
+def both_ways(before: Image, now: Image, points: Array, guess: Array, window: int, levels: int) -> tuple[Array, Flags]:
+    """Points (n, 2) by Lucas-Kanade from guesses of their motion (n, 2), and whether they come back to where they were."""
     start = points.astype(np.float32)
     motion = guess.astype(np.float32)
     size, guessed = (window, window), cv2.OPTFLOW_USE_INITIAL_FLOW
+    until = cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS
     there, found, _ = cv2.calcOpticalFlowPyrLK(
-        before, now, start, start + motion, winSize=size, maxLevel=levels, flags=guessed
+        before,
+        now,
+        start,
+        start + motion,
+        winSize=size,
+        maxLevel=levels,
+        flags=guessed,
+        criteria=(until, MOST_STEPS, SETTLED_PX),
     )
     back, returned, _ = cv2.calcOpticalFlowPyrLK(
-        now, before, there, there - motion, winSize=size, maxLevel=levels, flags=guessed
+        now,
+        before,
+        there,
+        there - motion,
+        winSize=size,
+        maxLevel=levels,
+        flags=guessed,
+        criteria=(until, MOST_STEPS, RETURN_SETTLED_PX),
     )
     good = (found[:, 0] > 0) & (returned[:, 0] > 0) & (np.linalg.norm(back - start, axis=1) < RETURN_PX)
     return np.asarray(there, np.float64), np.asarray(good, np.bool_)
 
 
 def _median_of_nearest(points: Array, guides: Array, motion: Array) -> Array:
-    # One product instead of all differences; the points' own squares do not change the order.
-    near = guides.astype(np.float32)
-    distance = np.sum(near**2, axis=1) - 2.0 * points.astype(np.float32) @ near.T
-    nearest = np.argpartition(distance, VOTES - 1, axis=1)[:, :VOTES]
-    median: Array = np.median(motion[nearest], axis=1)
-    return median
+    nearest = cKDTree(guides).query(points, k=VOTES)[1]
+    return cast(Array, np.sort(motion.T[:, nearest], axis=2)[:, :, VOTES // 2 - 1 : VOTES // 2 + 1].mean(axis=2).T)

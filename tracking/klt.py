@@ -1,15 +1,13 @@
 """The point tracker: pyramidal Lucas-Kanade checked by appearance and neighbours, and re-acquisition."""
 
 from dataclasses import dataclass
-from typing import cast
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from tracking.appearance import Appearance
 from tracking.consistency import MIN_SUPPORT, LocalMotion, Surroundings
-from tracking.flow import follow, spread_order
+from tracking.flow import Grays, follow, spread_order
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -49,10 +47,10 @@ class Observation:
 
 @dataclass(frozen=True)
 class _Begun:
-    """What is known of a frame before there is a prediction: its picture, gray, the flow to it, fine and half."""
+    """What is known of a frame before there is a prediction: its picture, gray, the flow to it, fine and coarse."""
 
     image: Image
-    gray: Image
+    grays: Grays
     points: Array
     fine: Picture
     coarse: Picture
@@ -67,12 +65,11 @@ class PointTracker:
     """
 
     def __init__(self, image_bgr: Image, points_px: Array) -> None:
-        gray = cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)
-        self._gray = cast(Image, gray)
+        self._grays = Grays.of(image_bgr)
         self._reference = points_px.astype(np.float64)
         self._order = spread_order(self._reference)
         self._surroundings = Surroundings(self._reference)
-        fine, coarse = _pictures(self._gray)
+        fine, coarse = _pictures(self._grays)
         self._fine = Appearance(fine, self._reference, PATCH_RADIUS)
         self._coarse = Appearance(coarse, self._reference / 2.0, PATCH_RADIUS)
         self._points = self._reference.copy()
@@ -81,8 +78,8 @@ class PointTracker:
 
     def begin(self, image_bgr: Image) -> None:
         """Do what `track` can do of the next frame before there is a prediction: most of its work, in another thread."""
-        gray = cast(Image, cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY))
-        self._begun = _Begun(image_bgr, gray, self._flow(gray), *_pictures(gray))
+        grays = Grays.of(image_bgr)
+        self._begun = _Begun(image_bgr, grays, self._flow(grays), *_pictures(grays))
 
     def track(self, image_bgr: Image, predicted_px: Array | None = None) -> Observation:
         """Find the points in the next frame.
@@ -96,7 +93,7 @@ class PointTracker:
             self.begin(image_bgr)
         assert self._begun is not None
         begun, self._begun = self._begun, None
-        self._gray, points, fine, coarse = begun.gray, begun.points, begun.fine, begun.coarse
+        self._grays, points, fine, coarse = begun.grays, begun.points, begun.fine, begun.coarse
         motion = self._motion(points, predicted_px)
         points[~motion.consistent] = np.nan
         points = self._refine(fine, coarse, points, motion)
@@ -113,8 +110,8 @@ class PointTracker:
             image_bgr: (H, W, 3) uint8, of the reference frame's size.
             expected_px: (P, 2) where the points are, to some pixels; NaN where that is not known.
         """
-        self._gray, self._begun = cast(Image, cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)), None
-        fine, coarse = _pictures(self._gray)
+        self._grays, self._begun = Grays.of(image_bgr), None
+        fine, coarse = _pictures(self._grays)
         points = np.full_like(self._reference, np.nan)
         for _ in range(RESUME_ROUNDS):  # what is found tells better where the others are
             sought = np.where(np.isfinite(points), points, expected_px + self._miss(points, expected_px))
@@ -125,11 +122,11 @@ class PointTracker:
         self._points, self._affine = points, motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
 
-    def _flow(self, gray: Image) -> Array:
+    def _flow(self, grays: Grays) -> Array:
         """The points seen in the last frame, by optical flow: (P, 2), NaN where lost."""
         points = np.full_like(self._points, np.nan)
         seen = self._order[np.isfinite(self._points[self._order, 0])]
-        points[seen] = follow(self._gray, gray, self._points[seen])
+        points[seen] = follow(self._grays, grays, self._points[seen])
         return points
 
     def _motion(self, points: Array, predicted_px: Array | None) -> LocalMotion:
@@ -214,7 +211,6 @@ def _inside(points: Array, shape: tuple[int, ...]) -> Flags:
     return inside[:, 0] & inside[:, 1]
 
 
-def _pictures(gray: Image) -> tuple[Picture, Picture]:
+def _pictures(grays: Grays) -> tuple[Picture, Picture]:
     """The picture and its half, as float32."""
-    fine = gray.astype(np.float32)
-    return fine, cast(Picture, cv2.pyrDown(fine))
+    return grays.full.astype(np.float32), grays.half.astype(np.float32)

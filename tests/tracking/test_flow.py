@@ -1,35 +1,29 @@
 import itertools
 
-import cv2
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.tracking.scene import SIZE, moved, texture
 from tracking.features import detect_corners
-from tracking.flow import follow, spread_order
+from tracking.flow import Grays, follow, spread_order
 from tracking.region import region_mask
 
-
-def gray(image: np.ndarray) -> np.ndarray:
-    return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
-
-
-BEFORE = gray(texture())
-POINTS = detect_corners(BEFORE, region_mask(SIZE, (60, 60, 200, 120)), 300)
+BEFORE = Grays.of(texture())
+POINTS = detect_corners(BEFORE.full, region_mask(SIZE, (60, 60, 200, 120)), 300)
 POINTS = POINTS[spread_order(POINTS)]
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(-15, 15), st.floats(-15, 15))
 def test_follows_a_shift(dx: float, dy: float) -> None:
-    now = moved(BEFORE[..., None].repeat(3, axis=2), lambda p: p - [dx, dy])
-    error = np.linalg.norm(follow(BEFORE, gray(now), POINTS) - POINTS - [dx, dy], axis=1)
+    now = moved(BEFORE.full[..., None].repeat(3, axis=2), lambda p: p - [dx, dy])
+    error = np.linalg.norm(follow(BEFORE, Grays.of(now), POINTS) - POINTS - [dx, dy], axis=1)
     assert np.mean(error < 0.2) > 0.9
 
 
 def test_points_of_a_picture_that_is_gone_do_not_come_back() -> None:
-    there = follow(BEFORE, gray(texture(seed=1)), POINTS)
+    there = follow(BEFORE, Grays.of(texture(seed=1)), POINTS)
     assert np.isnan(there[:, 0]).mean() > 0.7
 
 
