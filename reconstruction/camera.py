@@ -78,9 +78,9 @@ def quaternion_exp(theta: Array) -> Array:
 
 
 def quaternion_from_rotation(R: Array) -> Array:
-    """Unit quaternion (4,), w first and >= 0, of the rotation R (3, 3)."""
+    """Unit quaternions (..., 4), w first and >= 0, of rotations R (..., 3, 3)."""
     # Bar-Itzhack: the leading eigenvector of this symmetric matrix; no branches, and the nearest rotation for a noisy R.
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.moveaxis(R, (-2, -1), (0, 1))
     N = np.array(
         [
             [xx + yy + zz, zy - yz, xz - zx, yx - xy],
@@ -89,8 +89,8 @@ def quaternion_from_rotation(R: Array) -> Array:
             [yx - xy, zx + xz, zy + yz, zz - xx - yy],
         ]
     )
-    q: Array = np.linalg.eigh(N)[1][:, -1]
-    return q if q[0] >= 0 else -q
+    q: Array = np.linalg.eigh(np.moveaxis(N, (0, 1), (-2, -1)))[1][..., -1]
+    return np.where(q[..., :1] < 0, -q, q)
 
 
 def nearest_rotation(M: Array) -> Array:

@@ -11,7 +11,7 @@ from reconstruction import ReconstructionError
 from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
 from reconstruction.factorization import Factorization, affine_structure, factorize, view_turn_degrees
 from reconstruction.mesh import farthest_points
-from reconstruction.rigid import RigidMotion, adjust_poses, bundle_adjust, pose_energy, solve_points
+from reconstruction.rigid import RigidMotion, bundle_adjust, follow, solve_points
 
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
@@ -152,18 +152,12 @@ def plane(W: Array, visible: Visibility, camera: Camera) -> RestShape:
         return RestShape("plane", frontal, "flat sheet facing the camera: the first frames show no turn")
     frames = np.unique(np.linspace(0, len(W) - 1, 16).astype(int))
     W_few, visible_few = W[frames][:, :, chosen], visible[frames][:, chosen]
-    found = []
-    for axis in (np.zeros(3), *tilt_axes()):
-        start = sheet(
-            first[:, chosen],
-            rotation_from_quaternion(quaternion_exp(np.deg2rad(TILT_DEGREES) * axis)),
-            camera,
-        )
-        start = follow(W_few, visible_few, start, camera)
-        found.append(
-            bundle_adjust(W_few, visible_few, start, camera, flat=bool(axis.any()), sweeps=15 if axis.any() else 1)
-        )
-    level, tilted = found[0], min(found[1:], key=lambda result: result[1])
+    tilts = quaternion_exp(np.deg2rad(TILT_DEGREES) * np.concatenate([np.zeros((1, 3)), tilt_axes()]))
+    starts = [sheet(first[:, chosen], R, camera) for R in rotation_from_quaternion(tilts)]
+    ahead, *leaning = follow(W_few, visible_few, starts, camera)
+    level = bundle_adjust(W_few, visible_few, ahead, camera, sweeps=1)
+    found = [bundle_adjust(W_few, visible_few, start, camera, flat=True, sweeps=15) for start in leaning]
+    tilted = min(found, key=lambda result: result[1])
     turn = view_turn_degrees(tilted[0].R)
     if tilted[1] > TILT_GAIN * level[1] or turn < TURN_DEGREES:
         if tilted[1] > BENT_PX and len(W) >= 2 * FEWEST_FLAT:  # it bends meanwhile: judge by the frames before
@@ -195,21 +189,6 @@ def sheet(image: Array, R: Array, camera: Camera) -> RigidMotion:
 def tilt_axes() -> Array:
     """(4, 3) unit rotation axes in the image plane."""
     return np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
-
-
-def follow(W: Array, visible: Visibility, motion: RigidMotion, camera: Camera) -> RigidMotion:
-    """Poses of frames (F, 2, p) px one after another, starting from a motion of one frame."""
-    h = visible.astype(np.float64)
-    W = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None]
-    energy = pose_energy(camera)
-    R, s, t = [motion.R[0]], [motion.s[0]], [motion.t[0]]
-    for f in range(len(W)):
-        now = RigidMotion(motion.shape, R[-1][None], np.array(s[-1:]), t[-1][None])
-        now, _ = adjust_poses(W[f : f + 1], h[f : f + 1], now, camera, energy)
-        R.append(now.R[0])
-        s.append(now.s[0])
-        t.append(now.t[0])
-    return RigidMotion(motion.shape, np.array(R[1:]), np.array(s[1:]), np.array(t[1:]))
 
 
 def first_image(W: Array, visible: Visibility) -> Array:

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.energy import Energy, State
 from reconstruction.solver import Solver, minimise
-from reconstruction.statistics import frame_statistics, stack
+from reconstruction.statistics import Statistics, pose_statistics, stack
 
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
 
 ORTHOGRAPHIC_SCALE = 1.0  # λ_s without depth, where only a zoom changes the scale
 PERSPECTIVE_SCALE = 1e-3  # λ_s with depth, where moving towards the camera does
+POSES = Solver(iterations=10, tolerance=1e-4)
 
 
 @dataclass(frozen=True)
@@ -85,18 +86,42 @@ def bundle_adjust(
 
 def adjust_poses(W: Array, h: Array, motion: RigidMotion, camera: Camera, energy: Energy) -> tuple[RigidMotion, float]:
     """Poses given the shape, and the energy reached; W (F, 2, p) relative to the principal point."""
-    p = motion.shape.shape[1]
-    radius = float(np.sqrt((motion.shape**2).sum() / p))
-    B = np.concatenate([motion.shape / radius, np.ones((1, p))])
-    data = stack([frame_statistics(B, w / radius, v, camera.focal_px / radius) for w, v in zip(W, h, strict=True)])
-    q = np.array([quaternion_from_rotation(R) for R in motion.R])
-    start = State(q, motion.t / radius, np.log(motion.s), np.zeros((len(W), 3, 0)))
-    solution = minimise(energy, data, start, None, Solver(iterations=10, tolerance=1e-4))
-    end = solution.state
-    return (
-        RigidMotion(motion.shape, rotation_from_quaternion(end.q), np.exp(end.log_s), end.t * radius),
-        float(solution.value.sum()),
-    )
+    radius = rms_radius(motion.shape)
+    start = State(quaternion_from_rotation(motion.R), motion.t / radius, np.log(motion.s), np.zeros((len(W), 3, 0)))
+    found = minimise(energy, pose_data(W, h, motion.shape, camera), start, None, POSES)
+    end = found.state
+    motion = RigidMotion(motion.shape, rotation_from_quaternion(end.q), np.exp(end.log_s), end.t * radius)
+    return motion, float(found.value.sum())
+
+
+def follow(W: Array, visible: Visibility, starts: list[RigidMotion], camera: Camera) -> list[RigidMotion]:
+    """Poses of observations (F, 2, p) px frame after frame, from each of several motions of one frame; all at a time."""
+    h = visible.astype(np.float64)
+    W = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None]
+    energy = replace(pose_energy(camera), rotation=0.0, scale=0.0)  # starts are no neighbours in time
+    radius = np.array([rms_radius(start.shape) for start in starts])
+    q = quaternion_from_rotation(np.concatenate([start.R for start in starts]))
+    t, s = (np.concatenate([getattr(start, name) for start in starts]) for name in ("t", "s"))
+    now, path = State(q, t / radius[:, None], np.log(s), np.zeros((len(starts), 3, 0))), []
+    for f in range(len(W)):
+        data = stack([pose_data(W[f : f + 1], h[f : f + 1], start.shape, camera) for start in starts])
+        now = minimise(energy, data, now, None, POSES).state
+        path.append(now)
+    R = rotation_from_quaternion(np.stack([state.q for state in path]))
+    s, t = np.exp([state.log_s for state in path]), np.stack([state.t for state in path]) * radius[:, None]
+    return [RigidMotion(start.shape, R[:, k], s[:, k], t[:, k]) for k, start in enumerate(starts)]
+
+
+def pose_data(W: Array, h: Array, shape: Array, camera: Camera) -> Statistics:
+    """What points (F, 2, p) relative to the principal point say about the poses of a shape (3, p), in units of its size."""
+    radius = rms_radius(shape)
+    basis = np.concatenate([shape / radius, np.ones((1, shape.shape[1]))])
+    return pose_statistics(basis, W / radius, h, camera.focal_px / radius)
+
+
+def rms_radius(shape: Array) -> float:
+    """RMS distance of a centred shape's (3, p) points from its centre."""
+    return float(np.sqrt((shape**2).sum() / shape.shape[1]))
 
 
 def solve_points(W: Array, h: Array, motion: RigidMotion, camera: Camera, *, flat: bool) -> Array:

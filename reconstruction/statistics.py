@@ -75,7 +75,23 @@ def frame_statistics(basis: Array, W: Array, weights: Array, focal: float) -> St
     for start in range(0, len(weights), BLOCK):
         part = slice(start, start + BLOCK)
         sums += (moments[:, :, part] * basis[:, part]).reshape(4 * K, -1) @ basis[:, part].T
-    return from_sums(sums.reshape(4, K, K), focal)
+    return from_sums(sums.reshape(1, 4, K, K), focal)
+
+
+def pose_statistics(basis: Array, W: Array, weights: Array, focal: float) -> Statistics:
+    """Statistics of n frames at once, where the basis is small: one product.
+
+    Args:
+        basis: as for `frame_statistics`.
+        W: (n, 2, p) the same of each frame.
+        weights: (n, p) the same.
+        focal: the same.
+    """
+    n, _, p = W.shape
+    K = len(basis)
+    moments = np.concatenate([np.ones((n, 1, p)), W, (W**2).sum(axis=1, keepdims=True)], axis=1) * (weights / p)[:, None]
+    sums = moments.reshape(4 * n, p) @ (basis[:, None] * basis).reshape(K * K, p).T
+    return from_sums(sums.reshape(n, 4, K, K), focal)
 
 
 def down_date(complete: Array, basis: Array, lost: NDArray[np.bool_]) -> Array:
@@ -85,10 +101,10 @@ def down_date(complete: Array, basis: Array, lost: NDArray[np.bool_]) -> Array:
 
 
 def from_sums(sums: Array, focal: float) -> Statistics:
-    """Statistics from the weighted sums (4, K, K) with moments 1, W_x, W_y, |W|²; column −1 of B is the ones."""
+    """Statistics from n frames' weighted sums (n, 4, K, K) with moments 1, W_x, W_y, |W|²; column −1 of B is the ones."""
     gram = sums * np.array([1.0, 1 / focal, 1 / focal, 1 / focal**2])[:, None, None]
-    cross = sums[1:, :, -1] * np.array([1.0, 1.0, 1 / focal])[:, None]
-    return Statistics(gram[None], cross[None], sums[3, -1, -1][None])
+    cross = sums[:, 1:, :, -1] * np.array([1.0, 1.0, 1 / focal])[:, None]
+    return Statistics(gram, cross, sums[:, 3, -1, -1])
 
 
 def stack(parts: list[Statistics]) -> Statistics:
