@@ -41,11 +41,13 @@ class Guarded:
         observation: the points; nothing is visible while the surface is lost.
         change: whether it was lost or found in this frame.
         reason: why, in words.
+        abrupt: whether it was lost from one frame to the next, as by a cut.
     """
 
     observation: Observation
     change: Change = Change.NONE
     reason: str = ""
+    abrupt: bool = False
 
 
 class GuardedTracker:
@@ -89,7 +91,7 @@ class GuardedTracker:
             self.lost, self.frames_lost = True, 1
             how = f"only {share:.0%} of the points are seen"
             how += f", {just_now:.0%} just before: a cut or a jump" if jumped else ": it is covered or has left the picture"
-            return Guarded(self._nothing(), Change.LOST, how)
+            return Guarded(self._nothing(), Change.LOST, how, jumped)
         self._shares.append(share)
         seen = observation.visible[:, None]
         self._last_px = np.where(seen, observation.points_px, self._last_px if predicted_px is None else predicted_px)
