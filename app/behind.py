@@ -9,7 +9,7 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from app.parts import Parts
+from app.parts import Parts, Record, Summary
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.modes import Metric
 from tracking.klt import Observation
@@ -53,6 +53,10 @@ class Behind:
     def event(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:
         """Something that happened, in words."""
         self._hand_on(lambda: self._parts.event(index, time_s, text, level))
+
+    def another(self, record: Record, summary: Summary) -> None:
+        """Another object from here on."""
+        self._hand_on(lambda: self._parts.another(record, summary))
 
     def finish(self) -> None:
         """The run is over: everything is written, then the summary."""

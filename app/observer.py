@@ -15,7 +15,10 @@ class Observer(Protocol):
     """Somebody who follows a run, frame by frame and in order, as soon as there are shapes."""
 
     def begin(self, first: Frame, points_px: NDArray[np.float64], model: Model, fps: float) -> None:
-        """The first frame, the vertices (p, 2) px in it, the model, and the announced rate of the video."""
+        """The first frame, the vertices (p, 2) px in it, the model, and the announced rate of the video.
+
+        Called again when another object is followed: the frames from then on are of that one, its first frame was before.
+        """
 
     def frame(self, frame: Frame, observation: Observation, estimate: ShapeEstimate | None) -> None:
         """A frame and what is known of it."""

@@ -1,4 +1,4 @@
-"""A recording in parts, each complete in itself, for runs of hours and days."""
+"""A recording in parts, each complete in itself: for runs of hours and days, and since each has one model only."""
 
 from collections.abc import Callable, Mapping
 from itertools import count
@@ -19,6 +19,9 @@ from tracking.video import Frame
 RECORDINGS = Path("recordings")
 MODES_WAIT_S = 5.0  # a run of a few frames waits so long, at its end, for the figure of its modes
 
+Record = Callable[[Path | None], Recording]
+Summary = Callable[[], Mapping[str, object]]
+
 
 class Parts:
     """Writes like a `Recording`, and goes on in another file now and then; a context manager.
@@ -27,20 +30,21 @@ class Parts:
         path: of the first part; the others are numbered. None writes none.
         record: opens a recording of that path.
         summary: what is known of the run by now, told at the end of each part.
-        split_s: seconds of video in a part; None for one part only.
-
-    Attributes:
-        paths: of the parts so far.
+        split_s: seconds of video in a part; None for one part an object.
+        overwrite: whether files of the numbered parts' names are replaced; else other names are found.
     """
 
     def __init__(
         self,
         path: Path | None,
-        record: Callable[[Path | None], Recording],
-        summary: Callable[[], Mapping[str, object]],
+        record: Record,
+        summary: Summary,
         split_s: float | None = None,
+        *,
+        overwrite: bool = False,
     ) -> None:
-        self.path, self._record, self._summary, self._split_s = path, record, summary, split_s
+        self.path, self._record, self._summary = path, record, summary
+        self._split_s, self._overwrite = split_s, overwrite
         self._recording = record(path)
         self._parts, self._last = 1, path
         self._began_s: float | None = None
@@ -53,15 +57,17 @@ class Parts:
             self._began_s = frame.time_s
         if self._split_s is not None and self._model is not None and frame.time_s - self._began_s >= self._split_s:
             self._began_s = frame.time_s
+            self._recording.summary(self._summary())
             self._next()
+            self._tell_model()
         self._recording.observe(frame, observation, phase=phase)
 
     def model(self, model: Model, texture_bgr: NDArray[np.uint8], texture_px: NDArray[np.float64], metric: Metric) -> None:
         """The model, once it is known; `texture_px` (p, 2) are its vertices' pixels in `texture_bgr`."""
         self._model = model, texture_bgr, texture_px
         self._tell_model()
-        if self.path is not None:
-            self._modes = ModesBehind(model.basis, model.mesh, metric, self.path.stem)
+        if self._last is not None:
+            self._modes = ModesBehind(model.basis, model.mesh, metric, self._last.stem)
 
     def estimate(self, index: int, time_s: float, estimate: ShapeEstimate) -> None:
         """One frame's shape and pose."""
@@ -75,8 +81,15 @@ class Parts:
         """Something that happened, in words."""
         self._recording.event(index, time_s, text, level)
 
+    def another(self, record: Record, summary: Summary) -> None:
+        """Another object from here on, in another file, opened and ended by these; its model comes next."""
+        self.finish()
+        self._record, self._summary = record, summary
+        self._began_s = self._model = self._modes = None
+        self._next()
+
     def finish(self) -> None:
-        """The run is over: the summary, and the figure of the modes if it is there in time."""
+        """The object's run is over: the summary, and the figure of the modes if it is there in time."""
         self._recording.summary(self._summary())
         if self._modes and (figure := self._modes.figure(MODES_WAIT_S)):
             self._recording.modes(figure)
@@ -96,13 +109,11 @@ class Parts:
         return {"recording": str(self.path)} | parts
 
     def _next(self) -> None:
-        assert self.path is not None
-        self._recording.summary(self._summary())
         self._recording.close()
         self._parts += 1
-        self._last = free_name(self.path.parent, f"{self.path.stem}-part{self._parts}.rrd")
+        if self.path is not None:
+            self._last = beside(self.path, f"part{self._parts}", overwrite=self._overwrite)
         self._recording = self._record(self._last)
-        self._tell_model()
 
     def _tell_model(self) -> None:
         assert self._model is not None
@@ -115,6 +126,16 @@ class Parts:
 def free_name(folder: Path, source: str) -> Path:
     """A recording's path named after its source that does not exist yet: NAME.rrd, NAME-2.rrd, …"""
     stem = Path(source.split("?")[0]).stem.replace("%", "") or "video"
-    stem = f"camera{stem}" if source.isdigit() else stem
-    numbered = (folder / f"{stem}{f'-{n}' if n > 1 else ''}.rrd" for n in count(1))
-    return next(path for path in numbered if not path.exists())
+    return free(folder / f"{f'camera{stem}' if source.isdigit() else stem}.rrd")
+
+
+def beside(path: Path, what: str, *, overwrite: bool) -> Path:
+    """NAME-WHAT beside a file NAME, numbered if that exists and may not be replaced."""
+    other = path.with_name(f"{path.stem}-{what}{path.suffix}")
+    return other if overwrite else free(other)
+
+
+def free(path: Path) -> Path:
+    """The first of NAME, NAME-2, … that does not exist."""
+    numbered = (path.with_name(f"{path.stem}{f'-{n}' if n > 1 else ''}{path.suffix}") for n in count(1))
+    return next(one for one in numbered if not one.exists())

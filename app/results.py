@@ -26,6 +26,7 @@ class Collected:
         everything: whether every estimate is kept.
         truth_frames: source frames whose estimates are kept.
         estimates: by source frame.
+        lost: source frames without the object, if everything is kept.
         squared_px: sum of the squared reprojection errors so far.
         residuals: their number.
         last_rms_px: of the newest estimate.
@@ -34,6 +35,7 @@ class Collected:
     everything: bool
     truth_frames: frozenset[int] = frozenset()
     estimates: dict[int, ShapeEstimate] = field(default_factory=dict)
+    lost: list[int] = field(default_factory=list)
     squared_px: float = 0.0
     residuals: int = 0
     last_rms_px: float | None = None
@@ -47,6 +49,11 @@ class Collected:
         self.residuals += len(seen)
         if self.everything or frame in self.truth_frames:
             self.estimates[frame] = estimate
+
+    def lose(self, frame: int) -> None:
+        """Take notice of a source frame in which the object is lost."""
+        if self.everything:
+            self.lost.append(frame)
 
     @property
     def reprojection_rms_px(self) -> float | None:

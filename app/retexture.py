@@ -62,6 +62,7 @@ class Painter:
         self._out, self._laid = command.out, Laid(command.place, command.opacity)
         self._artwork = artwork
         self._sink: VideoSink | None = None
+        self._compositor: Compositor | None = None
         self._begun_s = 0.0
         self._elapsed_s = 0.0
         self.painted = 0
@@ -72,7 +73,13 @@ class Painter:
         return self._elapsed_s * 1e3 / self.painted if self.painted else None
 
     def begin(self, first: Frame, points_px: Array, model: Model, fps: float) -> None:
-        """The first frame, the vertices (p, 2) px in it, the model, and the rate of the video."""
+        """The first frame, the vertices (p, 2) px in it, the model, and the rate of the video.
+
+        Of a second object, it is not painted: the picture was made for the first.
+        """
+        if self._sink is not None:
+            self._compositor = None
+            return
         perspective = model.camera.perspective
         self._compositor = Compositor(first.image, points_px, model.mesh, perspective=perspective, laid=self._laid)
         height, width = first.image.shape[:2]
@@ -85,7 +92,7 @@ class Painter:
         if self._sink is None:
             return
         image = frame.image
-        if estimate is not None:
+        if estimate is not None and self._compositor is not None:
             picture = self._artwork.at(frame.time_s - self._begun_s)
             started = perf_counter()
             image = self._compositor.paint(image, picture, estimate.projection_px, estimate.shape[2], observation.points_px)
