@@ -24,7 +24,7 @@ from app.summary import in_words
 
 SOME_FAILED = 1
 INTERRUPTED = 130
-COLUMNS = ("frames", "points", "rest_shape", "visible_share", "losses", "reprojection_rms_px", "fps")
+COLUMNS = ("frames", "points", "rest_shape", "visible_share", "losses", "objects", "reprojection_rms_px", "fps")
 SHOWN = ("frames", "visible_share", "losses", "reprojection_rms_px", "fps")
 CONNECT_S = 5.0
 

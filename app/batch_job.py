@@ -87,6 +87,9 @@ def carry_out(job: Job, started: Callable[["subprocess.Popen[str]"], None] = lam
     words: Words = json.loads(out)
     unfinished.replace(job.recording)
     words |= {"source": job.video, "recording": str(job.recording)}
+    for number in range(2, int(str(words.get("parts", 1))) + 1):
+        part = unfinished.with_name(f"{job.name}-part{number}.rrd").replace(job.folder / f"{job.name}-part{number}.rrd")
+        words["last_part"] = str(part)
     write(job.report, words)
     return words
 

@@ -53,11 +53,13 @@ class Output:
     overwrite: bool = False
     """Replace existing files."""
     tracks_out: Path | None = None
-    """Save the tracked points as .npz: W (F, 2, P), visible (F, P)."""
+    """Save the tracked points as .npz: W (F, 2, P), visible (F, P); those of later objects in NAME-object2.npz, …"""
     shapes_out: Path | None = None
-    """Save the shapes as .npz: S (F, 3, P) camera axes, R, s, t, Lambda, faces, visible."""
+    """Save the shapes as .npz: S (F, 3, P) camera axes, R, s, t, Lambda, faces, visible; those of later objects in
+    NAME-object2.npz, …"""
     split_minutes: float | None = None
-    """Start another recording after so many minutes of video: NAME.rrd, NAME-part2.rrd, … Each is complete in itself."""
+    """Start another recording after so many minutes of video: NAME.rrd, NAME-part2.rrd, … Each is complete in itself. With
+    another object, one is started in any case."""
     image: Literal["jpeg", "video", "none"] = "jpeg"
     """How frames are stored in the recording: each as JPEG, the video file as it is, or not at all."""
     view: bool = False
@@ -115,6 +117,9 @@ class Source:
 class Run(Source):
     """Reconstruct a video, frame by frame, and record it.
 
+    After a cut to a scene that the object is not in, another object is followed there, in a recording of its own
+    (NAME-part2.rrd, …): 2 s after a cut, 10 s after it was covered or left the picture. The summary is about the first.
+
     Examples:
       modeshape run paper.mp4 --roi 195 95 325 265
       modeshape run 0 --view                        # the first camera, live
@@ -125,9 +130,10 @@ class Run(Source):
     """
 
     ground_truth: Path | None = None
-    """True shapes (.npz with W_px, S_gt, gt_frames) to score against."""
+    """True shapes (.npz with W_px, S_gt, gt_frames) to score the first object against."""
     texture: Path | None = None
-    """Picture (or video: its first) painted on the mesh in recording and viewer; for a video of it: modeshape retexture."""
+    """Picture (or video: its first) painted on the first object's mesh in recording and viewer; for a video of it:
+    modeshape retexture."""
     place: tuple[int, int, int, int] | None = None
     """Where --texture lies in the first frame: X Y WIDTH HEIGHT in pixels; without it over the whole mesh."""
     opacity: float = 1.0

@@ -77,13 +77,13 @@ def still(frames: int) -> Iterable[Image]:
     return (grain(texture(), rng) for _ in range(frames))
 
 
-def turning(frames: int) -> Iterable[Image]:
-    """A textured flat sheet that turns by 35° to and fro before a camera with a focal length of one picture's width."""
+def turning(frames: int, seed: int = 0, scale: float = 0.7) -> Iterable[Image]:
+    """A textured flat sheet (its texture by seed) that turns by 35° to and fro; the focal length is one picture's width."""
     rng = np.random.default_rng(0)
-    page, (width, height) = texture(), SIZE
+    page, (width, height) = texture(seed), SIZE
     K = np.array([[width, 0.0, width / 2], [0.0, width, height / 2], [0.0, 0.0, 1.0]])
     for f in range(frames):
         R, _ = cv2.Rodrigues(np.deg2rad([12 * np.sin(f / 9), 35 * np.sin(f / 12), 0.0]))
-        placed = np.column_stack([0.7 * R[:, 0], 0.7 * R[:, 1], [0.0, 0.0, float(width)]])
+        placed = np.column_stack([scale * R[:, 0], scale * R[:, 1], [0.0, 0.0, float(width)]])
         to_sheet = np.array([[1.0, 0.0, -width / 2], [0.0, 1.0, -height / 2], [0.0, 0.0, 1.0]])
         yield grain(cv2.warpPerspective(page, K @ placed @ to_sheet, SIZE), rng)
