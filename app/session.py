@@ -144,7 +144,7 @@ class Session:
         if guarded.change is Change.LOST:
             self._tally.losses += 1
             config = for_another(self._config, self._tally.objects + 1)
-            self._successor = Successor(config, frame, self._watch, abrupt=guarded.abrupt)
+            self._successor = Successor(config, frame, self._watch, cut=guarded.cut)
         else:
             self._tally.recoveries += 1
             self._successor = None

@@ -16,8 +16,8 @@ from tracking import TrackingError
 from tracking.klt import Observation
 from tracking.video import Frame
 
-# Seconds of the source in which only the lost object is looked for. A hand quick enough to look like a cut is mostly gone
-# by then; what was covered, or has left the picture, is expected back.
+# Seconds of the source in which only the lost object is looked for. After a cut it may come back with the next one, or when
+# a hand before the lens goes; what was covered, or has left the picture, is expected back.
 AFTER_CUT_S, AFTER_COVER_S = 2.0, 10.0
 AGAIN_S = 1.0  # until the next attempt, when there was nothing to follow
 SEEN = 0.5  # of its points another object keeps in sight until it has a model, or it is given up
@@ -30,7 +30,7 @@ class Successor:
     Args:
         config: what holds for the other object.
         lost: the frame in which the object was lost.
-        abrupt: whether that happened from one frame to the next.
+        cut: whether that was a cut.
         watch: to time it.
 
     Attributes:
@@ -38,11 +38,11 @@ class Successor:
         take: the other object, once it has a model.
     """
 
-    def __init__(self, config: Run, lost: Frame, watch: Stopwatch, *, abrupt: bool) -> None:
+    def __init__(self, config: Run, lost: Frame, watch: Stopwatch, *, cut: bool) -> None:
         self.lost = lost
         self.take: Take | None = None
         self._config, self._watch = config, watch
-        self._due_s = lost.time_s + (AFTER_CUT_S if abrupt else AFTER_COVER_S)
+        self._due_s = lost.time_s + (AFTER_CUT_S if cut else AFTER_COVER_S)
         self._tried: Take | None = None
         self._moves = False
 

@@ -4,6 +4,7 @@ from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,6 +26,13 @@ SEARCH_EVERY = 5  # ... in one out of so many
 SAME = 0.75  # of the share seen before: so many at the same place need no search
 
 
+# What is around the surface tells a hand that comes quickly from a cut, where nothing stays as it was.
+CELLS = (32, 24)  # of the picture that are compared: coarse enough for a camera that is not quite still
+LIKE = 10.0  # grey levels by which a cell may have changed
+STAYED = 0.5  # share of the cells around the surface: less, and it was a cut
+AROUND = 0.1  # share of the picture that must lie around the surface for this to say anything
+
+
 class Change(Enum):
     """What happened between two frames."""
 
@@ -41,13 +49,13 @@ class Guarded:
         observation: the points; nothing is visible while the surface is lost.
         change: whether it was lost or found in this frame.
         reason: why, in words.
-        abrupt: whether it was lost from one frame to the next, as by a cut.
+        cut: whether it was lost with everything around it, from one frame to the next.
     """
 
     observation: Observation
     change: Change = Change.NONE
     reason: str = ""
-    abrupt: bool = False
+    cut: bool = False
 
 
 class GuardedTracker:
@@ -65,7 +73,7 @@ class GuardedTracker:
     """
 
     def __init__(self, image_bgr: Image, points_px: Array) -> None:
-        self._reference = image_bgr
+        self._reference = self._image = image_bgr  # the first, and the last that showed the surface
         self._points = points_px
         self._tracker = PointTracker(image_bgr, points_px)
         self._relocation: Relocation | None = None
@@ -91,8 +99,10 @@ class GuardedTracker:
             self.lost, self.frames_lost = True, 1
             how = f"only {share:.0%} of the points are seen"
             how += f", {just_now:.0%} just before: a cut or a jump" if jumped else ": it is covered or has left the picture"
-            return Guarded(self._nothing(), Change.LOST, how, jumped)
+            cut = jumped and not stayed(self._image, image_bgr, self._last_px)
+            return Guarded(self._nothing(), Change.LOST, how, cut)
         self._shares.append(share)
+        self._image = image_bgr
         seen = observation.visible[:, None]
         self._last_px = np.where(seen, observation.points_px, self._last_px if predicted_px is None else predicted_px)
         return Guarded(observation)
@@ -120,6 +130,7 @@ class GuardedTracker:
         frames, self.lost, self.frames_lost = self.frames_lost - 1, False, 0
         self._shares.clear()
         self._shares.append(share)
+        self._image = image_bgr
         self._last_px = np.where(found.visible[:, None], found.points_px, self._last_px)
         lasted = f"after {frames} frame{'s' if frames > 1 else ''}"
         return Guarded(found, Change.RECOVERED, f"found {how}, {share:.0%} of the points, {lasted}")
@@ -133,3 +144,16 @@ class GuardedTracker:
 
     def _nothing(self) -> Observation:
         return Observation(np.full_like(self._points, np.nan), np.zeros(len(self._points), np.bool_))
+
+
+def stayed(before_bgr: Image, now_bgr: Image, surface_px: Array) -> bool:
+    """Whether most of what is around a surface, at (P, 2) px in the picture before, looks as it did; if there is enough."""
+    surface = np.zeros(before_bgr.shape[:2], np.uint8)
+    hull = cv2.convexHull(surface_px[np.isfinite(surface_px).all(axis=1)].astype(np.float32).reshape(-1, 1, 2))
+    cv2.fillConvexPoly(surface, np.rint(hull).astype(np.int32), (255,))
+    before, now, inside = (
+        cv2.resize(image, CELLS, interpolation=cv2.INTER_AREA) for image in (before_bgr, now_bgr, surface)
+    )
+    around = inside == 0
+    change = np.abs(before.astype(np.float64) - now).max(axis=2)[around]
+    return around.mean() > AROUND and bool(np.mean(change < LIKE) > STAYED)

@@ -6,7 +6,7 @@ import pytest
 
 from tests.tracking.scene import SIZE, moved, texture, tilt
 from tracking.features import detect_corners
-from tracking.guarded import Change, Guarded, GuardedTracker
+from tracking.guarded import Change, Guarded, GuardedTracker, stayed
 from tracking.region import region_mask
 from tracking.relocation import Relocation
 
@@ -119,3 +119,22 @@ def test_a_flash_costs_only_its_frames() -> None:
     assert found.change is Change.RECOVERED
     assert found.observation.visible.mean() > 0.9
     assert right(found, truth)
+
+
+def test_a_hand_that_comes_at_once_is_no_cut() -> None:
+    image, truth = scene(0.3)
+    covered, (x, y) = image.copy(), truth.astype(int).T
+    sheet = np.s_[y.min() - 8 : y.max() + 8, x.min() - 8 : x.max() + 8]
+    covered[sheet] = ELSEWHERE[sheet]
+    lost = followed().track(covered)
+    assert lost.change is Change.LOST
+    assert not lost.cut
+    lost = followed().track(ELSEWHERE)
+    assert lost.change is Change.LOST
+    assert lost.cut
+
+
+def test_nothing_is_said_of_surroundings_that_are_not_in_the_picture() -> None:
+    corners = np.array([[0.0, 0.0], [SIZE[0], 0.0], [0.0, SIZE[1]], list(SIZE)])
+    assert not stayed(IMAGE, IMAGE, corners)
+    assert stayed(IMAGE, IMAGE, 0.5 * corners)
