@@ -12,8 +12,9 @@ from app.config import Output, Run, Source, check_laid
 class Retexture(Source):
     """Put a picture or a video on the moving surface in a recording, or live in a video while it is tracked.
 
-    It lies in the scene's light, and behind what is in front of the surface. The options from --roi on are those of
-    `run` and only for videos, but for --frames.
+    It lies in the scene's light, and behind what is in front of the surface. When a video being tracked cuts to
+    another scene, frames stay as they are. The options from --roi on are those of `run` and only for videos, but for
+    --frames.
 
     Examples:
       modeshape retexture recordings/demo.rrd --texture poster.png --out poster.mp4
