@@ -9,17 +9,15 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from app.modes_behind import ModesBehind
-from app.recording import Recording
+from app.recorder import Recorder
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.modes import Metric
 from tracking.klt import Observation
 from tracking.video import Frame
 
 RECORDINGS = Path("recordings")
-MODES_WAIT_S = 5.0  # a run of a few frames waits so long, at its end, for the figure of its modes
 
-Record = Callable[[Path | None], Recording]
+Record = Callable[[Path | None], Recorder]
 Summary = Callable[[], Mapping[str, object]]
 
 
@@ -48,8 +46,7 @@ class Parts:
         self._recording = record(path)
         self._parts, self._last = 1, path
         self._began_s: float | None = None
-        self._model: tuple[Model, NDArray[np.uint8], NDArray[np.float64]] | None = None
-        self._modes: ModesBehind | None = None
+        self._model: tuple[Model, NDArray[np.uint8], NDArray[np.float64], Metric] | None = None
 
     def observe(self, frame: Frame, observation: Observation, *, phase: str) -> None:
         """A frame, its tracked points and the run's phase; from here on in another file, if it is time."""
@@ -64,10 +61,8 @@ class Parts:
 
     def model(self, model: Model, texture_bgr: NDArray[np.uint8], texture_px: NDArray[np.float64], metric: Metric) -> None:
         """The model, once it is known; `texture_px` (p, 2) are its vertices' pixels in `texture_bgr`."""
-        self._model = model, texture_bgr, texture_px
+        self._model = model, texture_bgr, texture_px, metric
         self._tell_model()
-        if self._last is not None:
-            self._modes = ModesBehind(model.basis, model.mesh, metric, self._last.stem)
 
     def estimate(self, index: int, time_s: float, estimate: ShapeEstimate) -> None:
         """One frame's shape and pose."""
@@ -85,14 +80,15 @@ class Parts:
         """Another object from here on, in another file, opened and ended by these; its model comes next."""
         self.finish()
         self._record, self._summary = record, summary
-        self._began_s = self._model = self._modes = None
+        self._began_s = self._model = None
         self._next()
 
     def finish(self) -> None:
-        """The object's run is over: the summary, and the figure of the modes if it is there in time."""
+        """The object's run is over: the summary, and the figure of the modes, which would have slowed the run."""
         self._recording.summary(self._summary())
-        if self._modes and (figure := self._modes.figure(MODES_WAIT_S)):
-            self._recording.modes(figure)
+        if self._model is not None:
+            model, _, _, metric = self._model
+            self._recording.modes(model.basis, model.mesh, metric)
 
     def __enter__(self) -> Self:
         return self
@@ -117,7 +113,7 @@ class Parts:
 
     def _tell_model(self) -> None:
         assert self._model is not None
-        model, image, points_px = self._model
+        model, image, points_px, _ = self._model
         self._recording.rest(
             model.basis, model.mesh.faces, model.mesh.edges, model.camera, texture_bgr=image, texture_px=points_px
         )

@@ -22,8 +22,9 @@ from app.stream import Stream, check_writable
 from app.viewer import running_viewer, spawned_viewer
 from app.wireframe import edge_strips, line_strips
 from reconstruction.camera import Camera
+from reconstruction.mesh import Mesh
 from reconstruction.model import ShapeEstimate
-from reconstruction.modes import ModalBasis
+from reconstruction.modes import Metric, ModalBasis
 from tracking.klt import Observation
 from tracking.video import Frame
 
@@ -199,10 +200,15 @@ class Recording:
         self._stream.at(index, time_s)
         self._stream.log(entities.EVENTS, rr.TextLog(text, level=level))
 
-    def modes(self, figure: bytes) -> None:
-        """The figure of the mode shapes, a JPEG."""
-        if self._stream.open:
-            self._stream.log(entities.MODES, rr.EncodedImage(contents=figure, media_type="image/jpeg"), static=True)
+    def modes(self, basis: ModalBasis, mesh: Mesh, metric: Metric) -> None:
+        """The figure of the mode shapes, which takes about a second to draw."""
+        if not self._stream.open:
+            return
+        from app.modes import draw, spectrum, title
+
+        name = self.path.stem if self.path else "the run"
+        figure = draw(basis, mesh, spectrum(basis, mesh, metric), title(name, basis, metric), jpeg=True)
+        self._stream.log(entities.MODES, rr.EncodedImage(contents=figure, media_type="image/jpeg"), static=True)
 
     def summary(self, values: Mapping[str, object]) -> None:
         """What came out of the run."""
@@ -225,12 +231,22 @@ class Recording:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         try:
-            self.close()
+            self.leave(failed=isinstance(error, Exception))
         except UsageError:
             if error is None:  # what ended the run matters more
                 raise
-        if isinstance(error, Exception) and not self._placed and self.path is not None:
-            self.path.unlink(missing_ok=True)  # failed before there was a shape: nothing to look at
+
+    def leave(self, *, failed: bool) -> None:
+        """Close; a file of a run that failed before there was a shape is removed: there is nothing to look at.
+
+        Raises:
+            UsageError: it could not be written.
+        """
+        try:
+            self.close()
+        finally:
+            if failed and not self._placed and self.path is not None:
+                self.path.unlink(missing_ok=True)
 
     def _points(self, entity: str, points_px: NDArray[np.floating]) -> None:
         self._stream.log(entity, rr.Points2D.from_fields(positions=points_px.astype(np.float32)))

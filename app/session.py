@@ -18,7 +18,7 @@ from app.interrupts import completed
 from app.observer import Followed, Observer
 from app.parts import RECORDINGS, Parts, free_name
 from app.progress import Progress
-from app.recording import Recording
+from app.recorder import Recorder
 from app.results import check_free
 from app.stopwatch import Stopwatch
 from app.successor import Successor, for_another
@@ -97,10 +97,10 @@ class Session:
         self._take.save()
         return self._summary(take)
 
-    def _record(self, config: Run, path: Path | None) -> Recording:
+    def _record(self, config: Run, path: Path | None) -> Recorder:
         """A recording of an object, or a part of it."""
         output = config.output
-        return Recording(
+        return Recorder(
             path,
             configuration=as_words(config),
             size=self._size,

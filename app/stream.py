@@ -5,9 +5,9 @@ import shutil
 import subprocess
 from collections.abc import Iterable
 from pathlib import Path
+from threading import Thread
 
 import rerun as rr
-import rerun_bindings as bindings
 import rerun_cli  # type: ignore[import-untyped]
 
 from app import entities
@@ -41,7 +41,7 @@ class Stream:
         if self._stream is None:
             return
         try:
-            opened(self._stream, sinks)
+            self._stream.set_sinks(*sinks, default_blueprint=blueprint())
         except RuntimeError as error:
             raise self._failure(error) from error
         self._stream.set_log_time_enabled(False)
@@ -84,13 +84,8 @@ class Stream:
         Raises:
             UsageError: it could not be written.
         """
-        if self._stream is None:
-            return
-        try:
-            self._stream.flush(timeout_sec=FLUSH_SECONDS)
-        except RuntimeError as error:
-            if "gRPC" not in str(error):
-                raise self._failure(error) from error
+        if self._stream is not None:
+            self._flush(self._stream)
 
     def close(self) -> None:
         """Complete the file; without it, `rerun rrd verify` refuses it.
@@ -98,38 +93,30 @@ class Stream:
         Raises:
             UsageError: it could not be written.
         """
+        stream, self._stream = self._stream, None
+        if stream is None:
+            return
         try:
-            self.flush()
-        finally:
-            if self._stream is not None:
-                self._stream.disconnect()
-                self._stream = None
-                bindings.flush_and_cleanup_orphaned_recordings()  # else its threads go on: a day of parts has thousands
-                if self._path is not None:
-                    index(self._path)
+            self._flush(stream)
+        except UsageError:
+            # Rerun may wait for ever for a file that it could not write.
+            Thread(target=stream.disconnect, daemon=True).start()
+            raise
+        stream.disconnect()
+        if self._path is not None:
+            index(self._path)
+
+    def _flush(self, stream: rr.RecordingStream) -> None:
+        try:
+            stream.flush(timeout_sec=FLUSH_SECONDS)
+        except RuntimeError as error:
+            if "gRPC" not in str(error):
+                raise self._failure(error) from error
 
     def _failure(self, error: RuntimeError) -> UsageError:
         full = self._path is not None and shutil.disk_usage(self._path.parent).free < FULL_BYTES
         reason = "the disk is full" if full else str(error)
         return UsageError(f"cannot write {self._path}: {reason}; choose another place with --out")
-
-
-def opened(stream: rr.RecordingStream, sinks: list[rr.FileSink | rr.GrpcSink]) -> None:
-    """Open the sinks and put our blueprint in, as `set_sinks(*sinks, default_blueprint=…)`.
-
-    That would keep two threads and 0.7 MB for the blueprint of every recording, until the end of the process.
-    """
-    application = entities.APPLICATION
-    layout = rr.RecordingStream._from_native(
-        bindings.new_blueprint(
-            application_id=application, make_default=False, make_thread_default=False, default_enabled=True
-        )
-    )
-    layout.set_time("blueprint", sequence=0)
-    blueprint()._log_to_stream(layout)
-    stored = layout.memory_recording()
-    bindings.set_sinks(list(sinks), default_blueprint=stored.storage, recording=stream.to_native())
-    layout.disconnect()  # it holds what is stored, which holds it
 
 
 def index(path: Path) -> None:

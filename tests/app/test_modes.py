@@ -17,7 +17,6 @@ from app.config import Run as Asked
 from app.config_export import Modes
 from app.errors import UsageError
 from app.modes import modes, spectrum
-from app.modes_behind import ModesBehind
 from app.modes_figure import AMPLITUDE, View, boundary, brightness, displaced, modes_figure
 from app.progress import Progress
 from app.session import Session
@@ -156,32 +155,12 @@ def test_the_rim_is_a_closed_line(run: Run) -> None:
     assert (np.bincount(rim.ravel())[np.unique(rim)] == 2).all()
 
 
-def test_drawn_by_another_process(run: Run) -> None:
-    behind = ModesBehind(run.basis, run.mesh, "euclidean", "sheet")
-    figure = behind.figure(60.0)
-    assert figure is not None
-    assert 0.05 < colorful(picture(figure)) < 0.6
-
-
-def test_nobody_waits_for_long(run: Run) -> None:
-    behind = ModesBehind(run.basis, run.mesh, "euclidean", "sheet")
-    assert behind.figure(0.0) is None
-
-
-def test_a_figure_that_cannot_be_drawn_is_left_out(run: Run) -> None:
-    behind = ModesBehind(run.basis, run.mesh, "chebyshev", "sheet")
-    assert behind.figure(60.0) is not None  # an unknown metric is drawn as euclidean
-    broken = ModalBasis(run.basis.rest, run.basis.Upsilon[:, :-1], run.basis.eigenvalues, run.basis.Phi)
-    assert ModesBehind(broken, run.mesh, "euclidean", "sheet").figure(60.0) is None
-
-
 def modeshape(*words: str | Path) -> subprocess.CompletedProcess[str]:
     script = Path(sys.executable).with_name("modeshape")
     return subprocess.run([script, *map(str, words)], capture_output=True, text=True, timeout=120)
 
 
-def test_a_run_records_the_figure(tmp_path: Path, shared_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.parts.MODES_WAIT_S", 60.0)  # for a busy machine
+def test_a_run_records_the_figure(tmp_path: Path, shared_data: Path) -> None:
     out, paper = tmp_path / "paper.rrd", shared_data / "kinect_paper.mp4"
     run = Asked(str(paper), roi=(195, 95, 325, 265), frames="0:12", points=150, output=Output(out=out))
     Session(run, Progress()).run()

@@ -312,15 +312,3 @@ def test_rerun_says_nothing_on_the_terminal(tmp_path: Path) -> None:
     root = Path(__file__).parents[2]
     done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, check=True)
     assert done.stdout == done.stderr == b""
-
-
-@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted in /proc")
-def test_closed_recordings_leave_no_thread_behind(tmp_path: Path) -> None:
-    def threads() -> int:
-        return len(list(Path("/proc/self/task").iterdir()))
-
-    write_run(tmp_path / "first.rrd")
-    before = threads()
-    for k in range(5):
-        write_run(tmp_path / f"{k}.rrd")
-    assert threads() <= before + 2
