@@ -46,7 +46,7 @@ class Session:
         self._config, self._progress, self._observer = config, progress, observer
         self._picture = first_picture(config.texture) if config.texture else None
         self._followed = Followed(observer)
-        for path in (config.output.tracks_out, config.output.shapes_out):
+        for path in (config.output.out, config.output.tracks_out, config.output.shapes_out):
             check_free(path, overwrite=config.output.overwrite)
         self._watch = Stopwatch()
         self._tally = Tally()
