@@ -10,10 +10,11 @@ from scipy.optimize import minimize_scalar
 from reconstruction import rest_shape
 from reconstruction.camera import Camera
 from reconstruction.constraints import Deformation, build_energy, chosen
-from reconstruction.energy import Energy, join
+from reconstruction.energy import Energy
 from reconstruction.model import Model, build_model
 from reconstruction.rest_shape import RestShape
 from reconstruction.solver import Solver, minimise
+from reconstruction.state import join
 from reconstruction.statistics import stack
 from reconstruction.window import SlidingWindow, robust_weights
 

@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
-from reconstruction.energy import CoarseEdges, State
+from reconstruction.energy import CoarseEdges
 from reconstruction.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges
 from reconstruction.modes import Metric, ModalBasis, modal_basis, principal_axes
 from reconstruction.rest_shape import RestShape
+from reconstruction.state import State
 from reconstruction.statistics import Statistics, frame_statistics
 
 Array = NDArray[np.float64]

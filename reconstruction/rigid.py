@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
-from reconstruction.energy import Energy, State
+from reconstruction.energy import Energy
 from reconstruction.solver import Solver, minimise
+from reconstruction.state import State
 from reconstruction.statistics import Statistics, pose_statistics, stack
 
 Array = NDArray[np.float64]

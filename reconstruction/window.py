@@ -12,11 +12,12 @@ from reconstruction.camera import (
     quaternion_product,
     rotation_from_quaternion,
 )
-from reconstruction.energy import Energy, State, join
+from reconstruction.energy import Energy
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.rest_shape import tilt_axes
 from reconstruction.rigid import RigidMotion, pose_energy
 from reconstruction.solver import Solution, Solver, minimise
+from reconstruction.state import State, join
 from reconstruction.statistics import Statistics, stack
 
 Array = NDArray[np.float64]

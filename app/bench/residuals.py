@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from app.bench.problems import WindowStep
 from reconstruction.camera import SANDWICH, rotation_from_quaternion
-from reconstruction.energy import State
+from reconstruction.state import State
 
 Array = NDArray[np.float64]
 

@@ -11,18 +11,16 @@ from hypothesis import strategies as st
 from reconstruction import statistics
 from reconstruction.energy import (
     HAT,
-    POSE,
     Energy,
-    State,
     edge_strain,
     edge_vectors,
     evaluate,
-    join,
     linearise,
     quaternion_difference,
     smoothness,
 )
 from reconstruction.model import Model
+from reconstruction.state import POSE, State, join
 from reconstruction.statistics import Statistics
 from tests.reconstruction.world import (
     CAMERAS,

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 from scipy.linalg import LinAlgError
 
 from reconstruction.camera import Camera, quaternion_exp, quaternion_from_rotation, quaternion_product
-from reconstruction.energy import Energy, State, evaluate
+from reconstruction.energy import Energy, evaluate
 from reconstruction.solver import Solver, banded, minimise, solve_banded
+from reconstruction.state import State
 from tests.reconstruction.world import CAMERAS, SEEDS, model_of, relief, seen, shape_error, statistics_of, turns
 
 
