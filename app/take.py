@@ -112,6 +112,7 @@ class Take:
             "bootstrap_frames": self.reconstruction.bootstrap_frames,
             "deformation": self.reconstruction.deformation,
             **self.reconstruction.focal_words,
+            "branch_switches": self.collected.switches,
             "reprojection_rms_px": self.collected.reprojection_rms_px,
         }
         if self._truth and rest:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from reconstruction.ambiguity import Switch, switch_between
 from reconstruction.camera import (
     CONJUGATE,
     quaternion_exp,
@@ -62,10 +63,12 @@ class SlidingWindow:
         self._data: list[Statistics] = []
         self._usual = np.inf  # energy of a new frame, running mean
         self._frame = -1
+        self._switch: Switch | None = None  # of the newest frame
 
     def advance(self, W: Array, visible: Visibility) -> ShapeEstimate:
         """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape."""
         self._frame += 1
+        self._switch = None
         weights = self._first_weights(W, visible)
         self._data.append(self.model.statistics(W, weights))
         window = self._first_state(W, visible) if self.state is None else join([self.state, self._leant(self.state[-1:])])
@@ -87,7 +90,7 @@ class SlidingWindow:
         self.spent += newest
         self._usual = newest if np.isinf(self._usual) else 0.9 * self._usual + 0.1 * newest
         self.state = found.state
-        return self.model.estimate(self._frame, W, visible, self.state)
+        return replace(self.model.estimate(self._frame, W, visible, self.state), switch=self._switch)
 
     def restart(self) -> None:
         """The surface was lost: the next frame is tied to nothing, and starts from the rest or from the last shape."""
@@ -128,13 +131,15 @@ class SlidingWindow:
 
         Edge lengths make the energy of Λ non-convex: a sheet bent one way or the other looks alike.
         """
+        best = found
         for factors in OTHER_BENDS:
-            Lambda = found.state.Lambda.copy()
+            Lambda = best.state.Lambda.copy()
             Lambda[-1] *= factors
-            other = self._adjust(replace(found.state, Lambda=Lambda))
-            if other.value.sum() < BENT_GAIN * found.value.sum():
-                found = other
-        return found
+            other = self._adjust(replace(best.state, Lambda=Lambda))
+            if other.value.sum() < BENT_GAIN * best.value.sum():
+                best = other
+        self._switch = switch_between(found, best)
+        return best
 
     def _first_state(self, W: Array, visible: Visibility) -> State:
         """Pose of the first frame with nothing deformed: that of the bootstrap, or a clearly better tilt."""
@@ -146,13 +151,14 @@ class SlidingWindow:
         q = quaternion_from_rotation(self._motion.R[0] @ model.basis.Phi)
         start = State(q[None], seen.mean(axis=1)[None] / model.radius, np.array([log_s]), np.zeros((1, 3, 0)))
         energy = pose_energy(model.camera)
-        found = minimise(energy, data, start, None, Solver())
+        found = best = minimise(energy, data, start, None, Solver())
         for tilt in FIRST_TILT * tilt_axes():
             tilted = replace(start, q=quaternion_product(quaternion_exp(tilt), q)[None])
             other = minimise(energy, data, tilted, None, Solver())
-            if other.value[0] < TILT_GAIN * found.value[0]:
-                found = other
-        return replace(found.state, Lambda=np.zeros((1, 3, len(model.basis.eigenvalues))))
+            if other.value[0] < TILT_GAIN * best.value[0]:
+                best = other
+        self._switch = switch_between(found, best)
+        return replace(best.state, Lambda=np.zeros((1, 3, len(model.basis.eigenvalues))))
 
 
 def extrapolated(earlier: State, last: State) -> State:
