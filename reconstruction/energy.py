@@ -38,13 +38,13 @@ class CoarseEdges:
 
 @dataclass(frozen=True)
 class Energy:
-    """Weights of the terms; each multiplies a sum of squares of dimensionless quantities.
+    """Weights of the terms; each multiplies a sum of squares of dimensionless quantities (`priors` says which when).
 
     Attributes:
         rotation: λ_q on ‖Δq‖² between neighbouring frames.
         translation: λ_t on ‖Δt‖².
         scale: λ_s on (Δ log s)².
-        deformation: λ_γ on ‖ΔΛ'‖².
+        smoothness: λ_γ on ‖ΔΛ'‖².
         rest: λ_0 on ‖Λ'‖², the pull to the rest shape; (r,) where each mode has its own.
         inextensibility: κ on the mean squared edge strain term of `edges`.
         rows: rows of Λ that are estimated (§3.4): 0 and 1 stretch in the plane, 2 bends out of it.
@@ -56,7 +56,7 @@ class Energy:
     rotation: float = 3e-4
     translation: float = 0.0
     scale: float = 1e-3
-    deformation: float = 1e-2
+    smoothness: float = 1e-2
     rest: float | Array = 1e-2
     inextensibility: float = 0.0
     rows: tuple[int, ...] = (0, 1, 2)
@@ -188,7 +188,7 @@ def smoothness(energy: Energy, earlier: State, later: State) -> Array:
         energy.rotation * (quaternion_difference(earlier.q, later.q) ** 2).sum(axis=1)
         + energy.translation * ((later.t - earlier.t) ** 2).sum(axis=1)
         + energy.scale * (later.log_s - earlier.log_s) ** 2
-        + energy.deformation * ((later.Lambda - earlier.Lambda) ** 2).sum(axis=(1, 2))
+        + energy.smoothness * ((later.Lambda - earlier.Lambda) ** 2).sum(axis=(1, 2))
     )
 
 
@@ -214,7 +214,7 @@ def add_smoothness(normal: Normal, energy: Energy, state: State, before: State |
     nearer = np.where((earlier.q * later.q).sum(axis=1) < 0, -1.0, 1.0)[:, None, None]
     J_earlier, J_later = -nearer * quaternion_tangent(earlier.q), quaternion_tangent(later.q)
     delta = quaternion_difference(earlier.q, later.q)[:, :, None]
-    weights = np.full(d, energy.deformation)
+    weights = np.full(d, energy.smoothness)
     weights[3:5], weights[5] = energy.translation, energy.scale
     change = np.zeros((n, d))
     change[:, 3:5] = later.t - earlier.t

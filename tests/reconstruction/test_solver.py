@@ -64,7 +64,7 @@ def scene(rng: np.random.Generator, camera: Camera, frames: int = 5, modes: int 
     return model, statistics_of(model, W, np.ones((frames, 50))), true, shape
 
 
-STIFF = Energy(rotation=1e-9, translation=0.0, scale=1e-9, deformation=1.0, rest=1e-9, tied=False)
+STIFF = Energy(rotation=1e-9, translation=0.0, scale=1e-9, smoothness=1.0, rest=1e-9, tied=False)
 
 
 def disturbed(rng: np.random.Generator, state: State, radians: float = 0.1) -> State:
