@@ -31,6 +31,8 @@ class Model:
     priors: Annotated[str | None, tyro.conf.arg(metavar="NAME=WEIGHT,…")] = None
     """Weights of the energy's priors instead of its own, 0 for none: rest, smoothness, rotation, translation, scale,
     inextensibility."""
+    refine_rest: bool = True
+    """Let later frames improve the rest shape. Not with --energy paper."""
     focal: float | Literal["auto"] | None = None
     """Focal length in pixels; without it that of the file, or the picture's width; auto: from the first frames, where
     they hold it."""

@@ -52,5 +52,6 @@ def settings_of(model: Model, rest_shape: str) -> Settings:
         window=model.window,
         energy=model.energy,
         priors=model.weights,
+        refine_rest=model.refine_rest,
         estimate_focal=model.focal == "auto",
     )

@@ -45,7 +45,8 @@ class Energy:
         translation: λ_t on ‖Δt‖².
         scale: λ_s on (Δ log s)².
         smoothness: λ_γ on ‖ΔΛ'‖².
-        rest: λ_0 on ‖Λ'‖², the pull to the rest shape; (r,) where each mode has its own.
+        rest: λ_0 on ‖Λ' − Λ̄'‖², the pull to the rest shape; (r,) where each mode has its own.
+        centre: Λ̄' (3, r), the rest shape as refined meanwhile.
         inextensibility: κ on the mean squared edge strain term of `edges`.
         rows: rows of Λ that are estimated (§3.4): 0 and 1 stretch in the plane, 2 bends out of it.
         free_scale: whether s is estimated; the paper's energy keeps s = 1.
@@ -58,11 +59,19 @@ class Energy:
     scale: float = 1e-3
     smoothness: float = 1e-2
     rest: float | Array = 1e-2
+    centre: float | Array = 0.0
     inextensibility: float = 0.0
     rows: tuple[int, ...] = (0, 1, 2)
     free_scale: bool = True
     tied: bool = True
     edges: CoarseEdges | None = None
+
+    def about(self, centre: Array) -> "Energy":
+        """The same energy about a rest shape refined to Λ̄' (3, r): what it pulls to, and which lengths edges keep."""
+        edges = self.edges
+        if edges is not None:
+            edges = replace(edges, length=np.linalg.norm(edges.rest + centre @ edges.modes, axis=0))
+        return replace(self, centre=centre, edges=edges)
 
     def rigid(self) -> "Energy":
         """The same energy with nothing deforming: pose only."""
@@ -88,7 +97,7 @@ class Normal:
 
 def evaluate(energy: Energy, data: Statistics, state: State, before: State | None) -> Array:
     """Energy (n,) per frame; `before` is the frame that has left the window (n = 1)."""
-    value = statistics.value(data, state.matrices()) + (energy.rest * state.Lambda**2).sum(axis=(1, 2))
+    value = statistics.value(data, state.matrices()) + (energy.rest * (state.Lambda - energy.centre) ** 2).sum(axis=(1, 2))
     if energy.edges is not None:
         strain = edge_strain(energy.edges, edge_vectors(energy.edges, state))
         value += energy.inextensibility * (strain**2).mean(axis=1)
@@ -152,8 +161,8 @@ def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> 
 
 
 def add_rest(normal: Normal, energy: Energy, state: State) -> None:
-    """λ_0‖Λ'‖²: the pull to the rest shape."""
-    free = state.Lambda[:, energy.rows, :]
+    """λ_0‖Λ' − Λ̄'‖²: the pull to the rest shape."""
+    free = (state.Lambda - energy.centre)[:, energy.rows, :]
     weights = np.broadcast_to(energy.rest, free.shape).reshape(len(state), -1)
     normal.gradient[:, POSE:] += weights * free.reshape(len(state), -1)
     diagonal = np.arange(POSE, normal.gradient.shape[1])

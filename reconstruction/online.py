@@ -45,6 +45,7 @@ class Settings:
         window: frames 𝒲 adjusted together.
         energy: anchored (tied to the past, pulled to rest) or the paper's §5 as printed.
         priors: weights by name (see `priors`) instead of that energy's own.
+        refine_rest: whether later frames refine the rest shape; not with the paper's energy.
         estimate_focal: whether the first frames may say the focal length of a perspective camera.
     """
 
@@ -56,6 +57,7 @@ class Settings:
     window: int = 5
     energy: Literal["anchored", "paper"] = "anchored"
     priors: Mapping[str, float] = field(default_factory=dict)
+    refine_rest: bool = True
     estimate_focal: bool = False
 
 
@@ -189,6 +191,7 @@ class Reconstruction:
         model = build_model(rest, self.camera, self.settings.modes, self.settings.metric, self._mesh)
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
-        self.window = SlidingWindow(model, energy, self.settings.window, rest.motion)
+        refine = self.settings.refine_rest and not paper
+        self.window = SlidingWindow(model, energy, self.settings.window, rest.motion, refine=refine)
         waiting, self._waiting = self._waiting, []
         return [self.window.advance(W, visible) for W, visible in waiting]

@@ -37,7 +37,7 @@ class Prior:
 
 PRIORS: dict[str, Prior] = {
     "rest": Prior(
-        "λ_0 Σ_k ω_k ‖Λ'_k‖², ω_k ∝ eigenvalue_k^(−½)",
+        "λ_0 Σ_k ω_k ‖Λ'_k − Λ̄'_k‖², ω_k ∝ eigenvalue_k^(−½)",
         "Pulls to the rest shape, weak modes harder. Without it, modes 1 and 2 do what tilt and scale should. More where "
         "points are few or noisy, less where the surface deforms far.",
         {"bending": 1e-2, "inextensible": 1e-3, OTHERWISE: 2e-2},

@@ -15,6 +15,7 @@ from reconstruction.camera import (
 )
 from reconstruction.energy import Energy
 from reconstruction.model import Model, ShapeEstimate
+from reconstruction.refinement import Refinement, at_rest
 from reconstruction.rest_shape import tilt_axes
 from reconstruction.rigid import RigidMotion, pose_energy
 from reconstruction.solver import Solution, Solver, minimise
@@ -47,13 +48,14 @@ class SlidingWindow:
         energy: what is minimised.
         length: frames 𝒲 in the window.
         motion: how the rest shape is seen in the first frame.
+        refine: whether frames that leave the window refine the rest shape.
 
     Attributes:
         state: the window's frames; None before the first.
         spent: energy of all frames so far, each when it was the newest.
     """
 
-    def __init__(self, model: Model, energy: Energy, length: int, motion: RigidMotion) -> None:
+    def __init__(self, model: Model, energy: Energy, length: int, motion: RigidMotion, *, refine: bool = False) -> None:
         self.model = model
         self.state: State | None = None
         self.spent = 0.0
@@ -63,6 +65,8 @@ class SlidingWindow:
         self._data: list[Statistics] = []
         self._usual = np.inf  # energy of a new frame, running mean
         self._frame = -1
+        self._rest = Refinement(len(model.basis.eigenvalues))
+        self._refine = refine
         self._switch: Switch | None = None  # of the newest frame
 
     def advance(self, W: Array, visible: Visibility) -> ShapeEstimate:
@@ -73,8 +77,7 @@ class SlidingWindow:
         self._data.append(self.model.statistics(W, weights))
         window = self._first_state(W, visible) if self.state is None else join([self.state, self._leant(self.state[-1:])])
         if len(window) > self._length:
-            self._before, window = window[:1], window[1:]
-            self._data.pop(0)
+            window = self._without_oldest(window)
         found = self._adjust(window)
         if self._lost is not None:
             found, self._lost = min(found, self._adjust(self._lost), key=lambda one: float(one.value.sum())), None
@@ -105,6 +108,16 @@ class SlidingWindow:
         last = self.state[-1:]
         return self.model.projection(extrapolated(self.state[-2:-1], last) if len(self.state) > 1 else last).T
 
+    def _without_oldest(self, window: State) -> State:
+        """The window without its oldest frame, about the rest shape that this frame refines."""
+        self._before, data = window[:1], self._data.pop(0)
+        if self._refine:
+            self._rest.take(data, self._before)
+            self._energy = self._energy.about(self._rest.rest)
+            self._before = at_rest(self._before, self._rest.rest, self._energy.rows)
+            window = at_rest(window, self._rest.rest, self._energy.rows)
+        return window[1:]
+
     def _adjust(self, start: State) -> Solution:
         return minimise(self._energy, stack(self._data), start, self._before, Solver())
 
@@ -131,10 +144,10 @@ class SlidingWindow:
 
         Edge lengths make the energy of Λ non-convex: a sheet bent one way or the other looks alike.
         """
-        best = found
+        best, rest = found, self._rest.rest
         for factors in OTHER_BENDS:
             Lambda = best.state.Lambda.copy()
-            Lambda[-1] *= factors
+            Lambda[-1] = rest + factors * (Lambda[-1] - rest)
             other = self._adjust(replace(best.state, Lambda=Lambda))
             if other.value.sum() < BENT_GAIN * best.value.sum():
                 best = other
@@ -158,7 +171,7 @@ class SlidingWindow:
             if other.value[0] < TILT_GAIN * best.value[0]:
                 best = other
         self._switch = switch_between(found, best)
-        return replace(best.state, Lambda=np.zeros((1, 3, len(model.basis.eigenvalues))))
+        return replace(best.state, Lambda=self._rest.rest[None].copy())
 
 
 def extrapolated(earlier: State, last: State) -> State:
