@@ -165,8 +165,7 @@ def add_rest(normal: Normal, energy: Energy, state: State) -> None:
     free = (state.Lambda - energy.centre)[:, energy.rows, :]
     weights = np.broadcast_to(energy.rest, free.shape).reshape(len(state), -1)
     normal.gradient[:, POSE:] += weights * free.reshape(len(state), -1)
-    diagonal = np.arange(POSE, normal.gradient.shape[1])
-    normal.diagonal[:, diagonal, diagonal] += weights
+    diagonals(normal.diagonal)[:, POSE:] += weights
 
 
 def edge_vectors(edges: CoarseEdges, state: State) -> Array:
@@ -229,17 +228,21 @@ def add_smoothness(normal: Normal, energy: Energy, state: State, before: State |
     change[:, 3:5] = later.t - earlier.t
     change[:, 5] = later.log_s - earlier.log_s
     change[:, POSE:] = (later.Lambda - earlier.Lambda)[:, energy.rows, :].reshape(n, -1)
-    plain = np.arange(3, d)
     for J, sign, frames in ((J_later, 1.0, slice(n)), (J_earlier, -1.0, slice(1, n) if tied else slice(n))):
         target = slice(0 if tied else 1, None) if sign > 0 else slice(0, len(state) - 1)
         Jt = energy.rotation * J[frames].transpose(0, 2, 1)
         normal.gradient[target, :3] += (Jt @ delta[frames])[:, :, 0]
         normal.gradient[target, 3:] += sign * weights[3:] * change[frames, 3:]
         normal.diagonal[target, :3, :3] += Jt @ J[frames]
-        normal.diagonal[target, plain, plain] += weights[3:]
+        diagonals(normal.diagonal[target])[:, 3:] += weights[3:]
     inner = slice(1, n) if tied else slice(n)
     normal.coupling[:, :3, :3] += energy.rotation * J_earlier[inner].transpose(0, 2, 1) @ J_later[inner]
-    normal.coupling[:, plain, plain] -= weights[3:]
+    diagonals(normal.coupling)[:, 3:] -= weights[3:]
+
+
+def diagonals(blocks: Array) -> Array:
+    """The diagonals (n, d) of blocks (n, d, d), to be changed in place."""
+    return np.asarray(np.einsum("nii->ni", blocks))
 
 
 def outer(a: Array, b: Array) -> Array:
