@@ -1,47 +1,15 @@
 """What a person can choose; nothing heavy is imported here, so that `--help` is instant."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
+from app.config_model import Model
 from app.errors import UsageError
 
 Words = dict[str, object]
-
-
-@dataclass(frozen=True)
-class Model:
-    """What is reconstructed, and how."""
-
-    bootstrap_frames: Literal["auto"] | int = "auto"
-    """Frames the rest shape comes from; auto decides from the evidence."""
-    metric: Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"] = "euclidean"
-    """Distance between points that the modes come from: straight, along the mesh's edges, in units of the extent along
-    each axis, chi-squared of the coordinates, or Jensen-Shannon of the nearness to landmarks."""
-    modes: int = 20
-    """Number of modes r."""
-    deformation: Literal["auto", "bending", "stretching", "general", "inextensible"] = "auto"
-    """How the surface may deform; auto: general for a solid rest shape, inextensible for a flat one, bending for a flat one
-    seen by an orthographic camera."""
-    window: int = 5
-    """Frames adjusted together."""
-    energy: Literal["anchored", "paper"] = "anchored"
-    """Anchored: tied to the past and pulled to rest. Paper: the paper's section 5 as printed (orthographic)."""
-    focal: float | Literal["auto"] | None = None
-    """Focal length in pixels; without it that of the file, or the picture's width; auto: from the first frames, where
-    they hold it."""
-
-    def __post_init__(self) -> None:
-        if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:
-            raise UsageError(f"--bootstrap-frames {self.bootstrap_frames} is too few: give auto, or 2 and more")
-        if self.modes < 1:
-            raise UsageError(f"--modes {self.modes} is too few: give 1 and more")
-        if self.window < 1:
-            raise UsageError(f"--window {self.window} is too short: give 1 and more")
-        if isinstance(self.focal, float) and not self.focal > 0:
-            raise UsageError(f"--focal {self.focal} is no focal length: give pixels, more than 0")
 
 
 @dataclass(frozen=True)
@@ -99,7 +67,7 @@ class Source:
     """Where the rest shape comes from: the first frames (a turning object: rigid; a flat sheet: plane), or a mesh file."""
     camera: Literal["perspective", "orthographic"] = "perspective"
     """How the picture came about."""
-    model: tyro.conf.OmitArgPrefixes[Model] = Model()
+    model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
 
     def __post_init__(self) -> None:
         if self.points < 4:
@@ -174,7 +142,7 @@ class Evaluate:
     """Replace existing files."""
     json: bool = False
     """Print the scores as JSON on stdout."""
-    model: tyro.conf.OmitArgPrefixes[Model] = Model()
+    model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
 
     def __post_init__(self) -> None:
         if not 0 <= self.missing < 1:

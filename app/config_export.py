@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.config import Model
+from app.config_model import Model
 from app.errors import UsageError
 
 

@@ -66,6 +66,8 @@ def evaluate(config: Evaluate, progress: Progress) -> Words:
         **reconstruction.focal_words,
         "bootstrap_frames": reconstruction.bootstrap_frames,
         "deformation": reconstruction.deformation,
+        "priors": reconstruction.weights,
+        "branch_switches": collected.switches,
         "reprojection_rms": collected.reprojection_rms_px,
         "ms_per_frame": elapsed_ms / frames,
     }

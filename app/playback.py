@@ -20,10 +20,10 @@ from app.stored_model import MODEL, TEXTURE, Modelled, modelled_part
 from app.stored_observations import OBSERVATION, POSITIONS, observed_part
 from app.stored_words import DOCUMENT, NAME, SCALARS, document, events, recording_name, stages
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
-from reconstruction.energy import State
 from reconstruction.mesh import Mesh
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.modes import ModalBasis
+from reconstruction.state import State
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]

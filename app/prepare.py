@@ -7,7 +7,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.config import Model, Run
+from app.config import Run
+from app.config_model import Model
 from app.mesh_file import rest_of_surface
 from reconstruction.camera import Camera
 from reconstruction.online import Reconstruction, Settings
@@ -50,5 +51,7 @@ def settings_of(model: Model, rest_shape: str) -> Settings:
         deformation=model.deformation,
         window=model.window,
         energy=model.energy,
+        priors=model.weights,
+        refine_rest=model.refine_rest,
         estimate_focal=model.focal == "auto",
     )

@@ -30,6 +30,7 @@ class Collected:
         squared_px: sum of the squared reprojection errors so far.
         residuals: their number.
         last_rms_px: of the newest estimate.
+        switches: how often the window took another branch: bent or tilted otherwise.
     """
 
     everything: bool
@@ -39,6 +40,7 @@ class Collected:
     squared_px: float = 0.0
     residuals: int = 0
     last_rms_px: float | None = None
+    switches: int = 0
 
     def add(self, frame: int, estimate: ShapeEstimate) -> None:
         """Take one estimate of a source frame."""
@@ -47,6 +49,7 @@ class Collected:
         self.last_rms_px = float(np.sqrt(squared / len(seen))) if len(seen) else None
         self.squared_px += squared
         self.residuals += len(seen)
+        self.switches += estimate.switch is not None
         if self.everything or frame in self.truth_frames:
             self.estimates[frame] = estimate
 

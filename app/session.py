@@ -175,6 +175,9 @@ class Session:
             self._record_model(settled[-1].index, settled[-1].time_s)
         for one in settled:
             self._recording.estimate(one.index, one.time_s, one.estimate)
+            if one.estimate.switch:
+                self._recording.event(one.index, one.time_s, one.estimate.switch.at(one.index), "WARN")
+                self._progress.say(one.estimate.switch.at(one.index))
             self._followed.shape(one.index, one.estimate)
 
     def _go_on_with(self, take: Take, lost: Frame, frame: Frame) -> None:

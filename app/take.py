@@ -111,7 +111,9 @@ class Take:
             "rest_shape_note": rest.note if rest else None,
             "bootstrap_frames": self.reconstruction.bootstrap_frames,
             "deformation": self.reconstruction.deformation,
+            "priors": self.reconstruction.weights,
             **self.reconstruction.focal_words,
+            "branch_switches": self.collected.switches,
             "reprojection_rms_px": self.collected.reprojection_rms_px,
         }
         if self._truth and rest:

@@ -1,15 +1,15 @@
 """What is known of how a surface deforms (paper §3.4): rows of Λ that stay zero, and how hard the others are held."""
 
-from dataclasses import replace
+from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
 
+from reconstruction import priors
 from reconstruction.camera import Camera
 from reconstruction.energy import Energy
 from reconstruction.model import Model
 from reconstruction.rest_shape import RestShape
-from reconstruction.rigid import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE
 
 Deformation = Literal["auto", "bending", "stretching", "general", "inextensible"]
 ROWS: dict[str, tuple[int, ...]] = {
@@ -18,14 +18,6 @@ ROWS: dict[str, tuple[int, ...]] = {
     "general": (0, 1, 2),
     "inextensible": (0, 1, 2),
 }
-# λ_0 and λ_γ: the more a constraint says, the less is left for the pull to rest and to the frame before.
-PULLS: dict[str, tuple[float, float]] = {
-    "bending": (1e-2, 1e-3),
-    "stretching": (2e-2, 3e-2),
-    "general": (2e-2, 3e-2),
-    "inextensible": (1e-3, 1e-3),
-}
-INEXTENSIBILITY = 3.0  # κ
 
 
 def chosen(deformation: Deformation, rest: RestShape, camera: Camera) -> Deformation:
@@ -41,17 +33,26 @@ def chosen(deformation: Deformation, rest: RestShape, camera: Camera) -> Deforma
     return "inextensible" if camera.perspective else "bending"
 
 
-def build_energy(model: Model, deformation: Deformation, *, paper: bool = False) -> Energy:
-    """The energy of a constraint on the deformation (paper §5, §3.4); `paper` as printed there."""
-    rows = ROWS[deformation]
-    if paper:
-        return Energy(rows=rows, rest=0.0, deformation=1e-3, free_scale=False, tied=False)
-    scale = PERSPECTIVE_SCALE if model.camera.perspective else ORTHOGRAPHIC_SCALE
+def build_energy(
+    model: Model, deformation: Deformation, chosen: Mapping[str, float] | None = None, *, paper: bool = False
+) -> Energy:
+    """The energy of a constraint on the deformation (paper §5, §3.4); `paper` as printed there: s = 1, a floating window.
+
+    `chosen` are weights of priors by name; the others keep their defaults.
+    """
+    weights = priors.weights(chosen or {}, deformation, perspective=model.camera.perspective, paper=paper)
     # A mode's eigenvalue says how much of the shape's extent it carries: weak modes are pulled to rest harder.
     stiffness = model.basis.eigenvalues**-0.5
     stiffness /= np.exp(np.log(stiffness).mean())
-    rest, smooth = PULLS[deformation]
-    energy = Energy(scale=scale, deformation=smooth, rest=rest * stiffness, rows=rows)
-    if deformation == "inextensible":
-        return replace(energy, inextensibility=INEXTENSIBILITY, edges=model.coarse_edges())
-    return energy
+    return Energy(
+        rotation=weights["rotation"],
+        translation=weights["translation"],
+        scale=weights["scale"],
+        smoothness=weights["smoothness"],
+        rest=weights["rest"] * stiffness,
+        inextensibility=weights["inextensibility"],
+        rows=ROWS[deformation],
+        free_scale=not paper,
+        tied=not paper,
+        edges=model.coarse_edges() if weights["inextensibility"] else None,
+    )

@@ -1,9 +1,7 @@
 """The energy of the on-line bundle adjustment (paper §5) and its derivatives, one function per term.
 
-A window of n frames holds q, t, log s and Λ' = Λ/√p per frame. Every term is a sum of squares; it returns its value, half
-its gradient and the Gauss-Newton approximation of half its Hessian, which is block tridiagonal over frames: the data and
-the priors couple nothing, smoothness couples neighbours. A frame's d = 6 + (free rows of Λ)·r parameters are ordered
-[θ (3, rotation vector applied on the right), t (2), log s, free rows of Λ' (row by row)].
+Every term is a sum of squares; it returns its value, half its gradient and the Gauss-Newton approximation of half its
+Hessian, which is block tridiagonal over frames: the data and the priors couple nothing, smoothness couples neighbours.
 """
 
 from dataclasses import dataclass, replace
@@ -12,63 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction import statistics
-from reconstruction.camera import left_matrix, quaternion_exp, quaternion_product, rotation_from_quaternion
+from reconstruction.camera import left_matrix
+from reconstruction.state import POSE, State, join
 from reconstruction.statistics import Statistics
 
 Array = NDArray[np.float64]
 
-POSE = 6  # θ, t, log s
 HAT = np.zeros((3, 3, 3))  # HAT[k] = [e_k]×
 for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     HAT[i, k, j], HAT[i, j, k] = 1.0, -1.0
-
-
-@dataclass(frozen=True)
-class State:
-    """Pose and coefficients of n frames in the principal frame, lengths in units of the rest shape's RMS radius.
-
-    Attributes:
-        q: (n, 4) unit quaternions of R' = RΦ, w first.
-        t: (n, 2) image translation.
-        log_s: (n,) logarithm of the scale.
-        Lambda: (n, 3, r) Λ' = Λ/√p.
-    """
-
-    q: Array
-    t: Array
-    log_s: Array
-    Lambda: Array
-
-    def __len__(self) -> int:
-        return len(self.log_s)
-
-    def __getitem__(self, frames: slice) -> "State":
-        return State(self.q[frames], self.t[frames], self.log_s[frames], self.Lambda[frames])
-
-    def moved(self, step: Array, rows: tuple[int, ...]) -> "State":
-        """The state after a step (n, d) in the local parameters, with the given rows of Λ free."""
-        Lambda = self.Lambda.copy()
-        Lambda[:, rows, :] += step[:, POSE:].reshape(len(self), len(rows), Lambda.shape[2])
-        q = quaternion_product(self.q, quaternion_exp(step[:, :3]))
-        q /= np.linalg.norm(q, axis=1, keepdims=True)
-        return State(q, self.t + step[:, 3:5], self.log_s + step[:, 5], Lambda)
-
-    def scaled_rotations(self) -> Array:
-        """A = sR' (n, 3, 3)."""
-        return np.exp(self.log_s)[:, None, None] * rotation_from_quaternion(self.q)
-
-    def matrices(self) -> Array:
-        """M = [sR', sR'Λ', (t; 0)] (n, 3, 4 + r)."""
-        A = self.scaled_rotations()
-        M = np.zeros((len(self), 3, 4 + self.Lambda.shape[2]))
-        M[:, :, :3], M[:, :, 3:-1], M[:, :2, -1] = A, A @ self.Lambda, self.t
-        return M
-
-
-def join(states: list[State]) -> State:
-    """One state of all frames, in order."""
-    fields = ("q", "t", "log_s", "Lambda")
-    return State(*(np.concatenate([getattr(s, name) for s in states]) for name in fields))
 
 
 @dataclass(frozen=True)
@@ -88,14 +38,15 @@ class CoarseEdges:
 
 @dataclass(frozen=True)
 class Energy:
-    """Weights of the terms; each multiplies a sum of squares of dimensionless quantities.
+    """Weights of the terms; each multiplies a sum of squares of dimensionless quantities (`priors` says which when).
 
     Attributes:
         rotation: λ_q on ‖Δq‖² between neighbouring frames.
         translation: λ_t on ‖Δt‖².
         scale: λ_s on (Δ log s)².
-        deformation: λ_γ on ‖ΔΛ'‖².
-        rest: λ_0 on ‖Λ'‖², the pull to the rest shape; (r,) where each mode has its own.
+        smoothness: λ_γ on ‖ΔΛ'‖².
+        rest: λ_0 on ‖Λ' − Λ̄'‖², the pull to the rest shape; (r,) where each mode has its own.
+        centre: Λ̄' (3, r), the rest shape as refined meanwhile.
         inextensibility: κ on the mean squared edge strain term of `edges`.
         rows: rows of Λ that are estimated (§3.4): 0 and 1 stretch in the plane, 2 bends out of it.
         free_scale: whether s is estimated; the paper's energy keeps s = 1.
@@ -106,13 +57,21 @@ class Energy:
     rotation: float = 3e-4
     translation: float = 0.0
     scale: float = 1e-3
-    deformation: float = 1e-2
+    smoothness: float = 1e-2
     rest: float | Array = 1e-2
+    centre: float | Array = 0.0
     inextensibility: float = 0.0
     rows: tuple[int, ...] = (0, 1, 2)
     free_scale: bool = True
     tied: bool = True
     edges: CoarseEdges | None = None
+
+    def about(self, centre: Array) -> "Energy":
+        """The same energy about a rest shape refined to Λ̄' (3, r): what it pulls to, and which lengths edges keep."""
+        edges = self.edges
+        if edges is not None:
+            edges = replace(edges, length=np.linalg.norm(edges.rest + centre @ edges.modes, axis=0))
+        return replace(self, centre=centre, edges=edges)
 
     def rigid(self) -> "Energy":
         """The same energy with nothing deforming: pose only."""
@@ -138,7 +97,7 @@ class Normal:
 
 def evaluate(energy: Energy, data: Statistics, state: State, before: State | None) -> Array:
     """Energy (n,) per frame; `before` is the frame that has left the window (n = 1)."""
-    value = statistics.value(data, state.matrices()) + (energy.rest * state.Lambda**2).sum(axis=(1, 2))
+    value = statistics.value(data, state.matrices()) + (energy.rest * (state.Lambda - energy.centre) ** 2).sum(axis=(1, 2))
     if energy.edges is not None:
         strain = edge_strain(energy.edges, edge_vectors(energy.edges, state))
         value += energy.inextensibility * (strain**2).mean(axis=1)
@@ -202,12 +161,11 @@ def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> 
 
 
 def add_rest(normal: Normal, energy: Energy, state: State) -> None:
-    """λ_0‖Λ'‖²: the pull to the rest shape."""
-    free = state.Lambda[:, energy.rows, :]
+    """λ_0‖Λ' − Λ̄'‖²: the pull to the rest shape."""
+    free = (state.Lambda - energy.centre)[:, energy.rows, :]
     weights = np.broadcast_to(energy.rest, free.shape).reshape(len(state), -1)
     normal.gradient[:, POSE:] += weights * free.reshape(len(state), -1)
-    diagonal = np.arange(POSE, normal.gradient.shape[1])
-    normal.diagonal[:, diagonal, diagonal] += weights
+    diagonals(normal.diagonal)[:, POSE:] += weights
 
 
 def edge_vectors(edges: CoarseEdges, state: State) -> Array:
@@ -238,7 +196,7 @@ def smoothness(energy: Energy, earlier: State, later: State) -> Array:
         energy.rotation * (quaternion_difference(earlier.q, later.q) ** 2).sum(axis=1)
         + energy.translation * ((later.t - earlier.t) ** 2).sum(axis=1)
         + energy.scale * (later.log_s - earlier.log_s) ** 2
-        + energy.deformation * ((later.Lambda - earlier.Lambda) ** 2).sum(axis=(1, 2))
+        + energy.smoothness * ((later.Lambda - earlier.Lambda) ** 2).sum(axis=(1, 2))
     )
 
 
@@ -264,23 +222,27 @@ def add_smoothness(normal: Normal, energy: Energy, state: State, before: State |
     nearer = np.where((earlier.q * later.q).sum(axis=1) < 0, -1.0, 1.0)[:, None, None]
     J_earlier, J_later = -nearer * quaternion_tangent(earlier.q), quaternion_tangent(later.q)
     delta = quaternion_difference(earlier.q, later.q)[:, :, None]
-    weights = np.full(d, energy.deformation)
+    weights = np.full(d, energy.smoothness)
     weights[3:5], weights[5] = energy.translation, energy.scale
     change = np.zeros((n, d))
     change[:, 3:5] = later.t - earlier.t
     change[:, 5] = later.log_s - earlier.log_s
     change[:, POSE:] = (later.Lambda - earlier.Lambda)[:, energy.rows, :].reshape(n, -1)
-    plain = np.arange(3, d)
     for J, sign, frames in ((J_later, 1.0, slice(n)), (J_earlier, -1.0, slice(1, n) if tied else slice(n))):
         target = slice(0 if tied else 1, None) if sign > 0 else slice(0, len(state) - 1)
         Jt = energy.rotation * J[frames].transpose(0, 2, 1)
         normal.gradient[target, :3] += (Jt @ delta[frames])[:, :, 0]
         normal.gradient[target, 3:] += sign * weights[3:] * change[frames, 3:]
         normal.diagonal[target, :3, :3] += Jt @ J[frames]
-        normal.diagonal[target, plain, plain] += weights[3:]
+        diagonals(normal.diagonal[target])[:, 3:] += weights[3:]
     inner = slice(1, n) if tied else slice(n)
     normal.coupling[:, :3, :3] += energy.rotation * J_earlier[inner].transpose(0, 2, 1) @ J_later[inner]
-    normal.coupling[:, plain, plain] -= weights[3:]
+    diagonals(normal.coupling)[:, 3:] -= weights[3:]
+
+
+def diagonals(blocks: Array) -> Array:
+    """The diagonals (n, d) of blocks (n, d, d), to be changed in place."""
+    return np.asarray(np.einsum("nii->ni", blocks))
 
 
 def outer(a: Array, b: Array) -> Array:

@@ -1,6 +1,6 @@
 """The focal length from the data: with the wrong one, the first frames cost more energy."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,10 +10,11 @@ from scipy.optimize import minimize_scalar
 from reconstruction import rest_shape
 from reconstruction.camera import Camera
 from reconstruction.constraints import Deformation, build_energy, chosen
-from reconstruction.energy import Energy, join
+from reconstruction.energy import Energy
 from reconstruction.model import Model, build_model
 from reconstruction.rest_shape import RestShape
 from reconstruction.solver import Solver, minimise
+from reconstruction.state import join
 from reconstruction.statistics import stack
 from reconstruction.window import SlidingWindow, robust_weights
 
@@ -46,7 +47,14 @@ class FocalEstimate:
     note: str
 
 
-def estimate(W: Array, visible: Visibility, camera: Camera, rest: RestShape, deformation: Deformation) -> FocalEstimate:
+def estimate(
+    W: Array,
+    visible: Visibility,
+    camera: Camera,
+    rest: RestShape,
+    deformation: Deformation,
+    priors: Mapping[str, float] | None = None,
+) -> FocalEstimate:
     """The focal length that explains observations (F, 2, p) px with visibility (F, p) best.
 
     Args:
@@ -55,13 +63,15 @@ def estimate(W: Array, visible: Visibility, camera: Camera, rest: RestShape, def
         camera: with the focal length assumed so far.
         rest: the rest shape under that focal length, of which the pose in the first frame is believed.
         deformation: the constraint on Λ.
+        priors: weights by name that are not the defaults.
     """
     if len(W) < FEWEST:
         return FocalEstimate(camera.focal_px, False, assumed(camera.focal_px, f"{len(W)} frames are too few to tell"))
     points = rest_shape.judging_points(W, visible)
     frames = np.unique(np.linspace(0, len(W) - 1, FRAMES).astype(int))
     motion = replace(rest.motion, shape=rest.motion.shape[:, points])
-    trials = Trials(W[frames][:, :, points], visible[frames][:, points], replace(rest, motion=motion), deformation, camera)
+    W, visible, rest = W[frames][:, :, points], visible[frames][:, points], replace(rest, motion=motion)
+    trials = Trials(W, visible, camera, rest, deformation, priors)
     return search(trials.cost, camera.focal_px)
 
 
@@ -71,13 +81,22 @@ class Trials:
     Args:
         W: (F, 2, p) px, few frames and points.
         visible: (F, p).
+        camera: as in `estimate`.
         rest: as in `estimate`.
         deformation: the constraint on Λ.
-        camera: as in `estimate`.
+        priors: as in `estimate`.
     """
 
-    def __init__(self, W: Array, visible: Visibility, rest: RestShape, deformation: Deformation, camera: Camera) -> None:
-        self._W, self._visible, self._rest, self._camera = W, visible, rest, camera
+    def __init__(
+        self,
+        W: Array,
+        visible: Visibility,
+        camera: Camera,
+        rest: RestShape,
+        deformation: Deformation,
+        priors: Mapping[str, float] | None = None,
+    ) -> None:
+        self._W, self._visible, self._rest, self._camera, self._priors = W, visible, rest, camera, priors
         self._deformation = chosen(deformation, rest, camera)
         model, energy = self._problem(camera.focal_px)
         window = SlidingWindow(model, energy, WINDOW, rest.motion)
@@ -103,7 +122,7 @@ class Trials:
         if rest.kind == "plane":
             rest = rest_shape.plane(self._W, self._visible, camera)  # its tilt depends on the focal length
         model = build_model(rest, camera, min(MODES, self._W.shape[2] - 1))
-        return model, build_energy(model, self._deformation)
+        return model, build_energy(model, self._deformation, self._priors)
 
 
 def search(cost: Callable[[float], float], start_px: float) -> FocalEstimate:

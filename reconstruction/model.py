@@ -5,11 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from reconstruction.ambiguity import Switch
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
-from reconstruction.energy import CoarseEdges, State
+from reconstruction.energy import CoarseEdges
 from reconstruction.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges
 from reconstruction.modes import Metric, ModalBasis, modal_basis, principal_axes
 from reconstruction.rest_shape import RestShape
+from reconstruction.state import State
 from reconstruction.statistics import Statistics, frame_statistics
 
 Array = NDArray[np.float64]
@@ -32,6 +34,7 @@ class ShapeEstimate:
         projection_px: (p, 2) the shape seen by the camera.
         residual_px: (p,) distance to the observation, NaN where not visible.
         visible: (p,) h^f.
+        switch: the other branch that the window took with this frame, if it did.
     """
 
     frame: int
@@ -44,6 +47,7 @@ class ShapeEstimate:
     projection_px: Array
     residual_px: Array
     visible: NDArray[np.bool_]
+    switch: Switch | None = None
 
 
 class Model:

@@ -1,18 +1,20 @@
 """The on-line estimator: one observation in, the shapes it settles out (paper §5)."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reconstruction import ReconstructionError, focal, rest_shape
+from reconstruction import ReconstructionError, focal, priors, rest_shape
 from reconstruction.camera import Camera
 from reconstruction.constraints import Deformation, build_energy, chosen
 from reconstruction.mesh import Mesh
 from reconstruction.model import Model, ShapeEstimate, build_model
 from reconstruction.modes import Metric
+from reconstruction.priors import Weights
 from reconstruction.rest_shape import RestShape
 from reconstruction.window import SlidingWindow
 
@@ -42,6 +44,8 @@ class Settings:
         deformation: constraint on Λ (§3.4).
         window: frames 𝒲 adjusted together.
         energy: anchored (tied to the past, pulled to rest) or the paper's §5 as printed.
+        priors: weights by name (see `priors`) instead of that energy's own.
+        refine_rest: whether later frames refine the rest shape; not with the paper's energy.
         estimate_focal: whether the first frames may say the focal length of a perspective camera.
     """
 
@@ -52,6 +56,8 @@ class Settings:
     deformation: Deformation = "auto"
     window: int = 5
     energy: Literal["anchored", "paper"] = "anchored"
+    priors: Mapping[str, float] = field(default_factory=dict)
+    refine_rest: bool = True
     estimate_focal: bool = False
 
 
@@ -77,6 +83,7 @@ class Reconstruction:
     ) -> None:
         if settings.energy == "paper" and camera.perspective:
             raise ReconstructionError("--energy paper is orthographic: use it with --camera orthographic")
+        priors.check(settings.priors)
         self.camera, self.settings = camera, settings
         self.rest = given
         self._mesh = mesh
@@ -103,6 +110,14 @@ class Reconstruction:
         """The focal length in force, None for an orthographic camera, and how it was found if it was looked for."""
         note = {"focal_note": self.focal_note} if self.focal_note else {}
         return {"focal_px": self.camera.focal_px if self.camera.perspective else None, **note}
+
+    @property
+    def weights(self) -> Weights:
+        """Weights of all priors, by name; empty until the rest shape decides on the deformation."""
+        if self.deformation == "auto":
+            return {}
+        paper = self.settings.energy == "paper"
+        return priors.weights(self.settings.priors, self.deformation, perspective=self.camera.perspective, paper=paper)
 
     def predict(self) -> Array | None:
         """Where the next frame will see the points, (p, 2) px at constant velocity; None while bootstrapping."""
@@ -164,7 +179,7 @@ class Reconstruction:
         recovery = rest_shape.rigid if kind == "rigid" else rest_shape.plane
         rest = recovery(W, visible, self.camera)
         if self.settings.estimate_focal and self.camera.perspective:
-            found = focal.estimate(W, visible, self.camera, rest, self.deformation)
+            found = focal.estimate(W, visible, self.camera, rest, self.deformation, self.settings.priors)
             self.camera, self.focal_note = replace(self.camera, focal_px=found.focal_px), found.note
             if found.known:
                 rest = recovery(W, visible, self.camera)
@@ -174,7 +189,9 @@ class Reconstruction:
         self.rest, self.bootstrap_frames = rest, len(self._waiting)
         self.deformation = chosen(self.deformation, rest, self.camera)
         model = build_model(rest, self.camera, self.settings.modes, self.settings.metric, self._mesh)
-        energy = build_energy(model, self.deformation, paper=self.settings.energy == "paper")
-        self.window = SlidingWindow(model, energy, self.settings.window, rest.motion)
+        paper = self.settings.energy == "paper"
+        energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
+        refine = self.settings.refine_rest and not paper
+        self.window = SlidingWindow(model, energy, self.settings.window, rest.motion, refine=refine)
         waiting, self._waiting = self._waiting, []
         return [self.window.advance(W, visible) for W, visible in waiting]

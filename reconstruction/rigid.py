@@ -6,15 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
-from reconstruction.energy import Energy, State
+from reconstruction.energy import Energy
+from reconstruction.priors import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE
 from reconstruction.solver import Solver, minimise
+from reconstruction.state import State
 from reconstruction.statistics import Statistics, pose_statistics, stack
 
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
 
-ORTHOGRAPHIC_SCALE = 1.0  # λ_s without depth, where only a zoom changes the scale
-PERSPECTIVE_SCALE = 1e-3  # λ_s with depth, where moving towards the camera does
 POSES = Solver(iterations=10, tolerance=1e-4)
 
 

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 from scipy.linalg.lapack import dpbsv
 
-from reconstruction.energy import Energy, Normal, State, evaluate, linearise
+from reconstruction.energy import Energy, Normal, evaluate, linearise
+from reconstruction.state import State
 from reconstruction.statistics import Statistics
 
 Array = NDArray[np.float64]

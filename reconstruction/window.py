@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from reconstruction.ambiguity import Switch, switch_between
 from reconstruction.camera import (
     CONJUGATE,
     quaternion_exp,
@@ -12,11 +13,13 @@ from reconstruction.camera import (
     quaternion_product,
     rotation_from_quaternion,
 )
-from reconstruction.energy import Energy, State, join
+from reconstruction.energy import Energy
 from reconstruction.model import Model, ShapeEstimate
+from reconstruction.refinement import Refinement, at_rest
 from reconstruction.rest_shape import tilt_axes
 from reconstruction.rigid import RigidMotion, pose_energy
 from reconstruction.solver import Solution, Solver, minimise
+from reconstruction.state import State, join
 from reconstruction.statistics import Statistics, stack
 
 Array = NDArray[np.float64]
@@ -45,13 +48,14 @@ class SlidingWindow:
         energy: what is minimised.
         length: frames 𝒲 in the window.
         motion: how the rest shape is seen in the first frame.
+        refine: whether frames that leave the window refine the rest shape.
 
     Attributes:
         state: the window's frames; None before the first.
         spent: energy of all frames so far, each when it was the newest.
     """
 
-    def __init__(self, model: Model, energy: Energy, length: int, motion: RigidMotion) -> None:
+    def __init__(self, model: Model, energy: Energy, length: int, motion: RigidMotion, *, refine: bool = False) -> None:
         self.model = model
         self.state: State | None = None
         self.spent = 0.0
@@ -61,16 +65,19 @@ class SlidingWindow:
         self._data: list[Statistics] = []
         self._usual = np.inf  # energy of a new frame, running mean
         self._frame = -1
+        self._rest = Refinement(len(model.basis.eigenvalues))
+        self._refine = refine
+        self._switch: Switch | None = None  # of the newest frame
 
     def advance(self, W: Array, visible: Visibility) -> ShapeEstimate:
         """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape."""
         self._frame += 1
+        self._switch = None
         weights = self._first_weights(W, visible)
         self._data.append(self.model.statistics(W, weights))
         window = self._first_state(W, visible) if self.state is None else join([self.state, self._leant(self.state[-1:])])
         if len(window) > self._length:
-            self._before, window = window[:1], window[1:]
-            self._data.pop(0)
+            window = self._without_oldest(window)
         found = self._adjust(window)
         if self._lost is not None:
             found, self._lost = min(found, self._adjust(self._lost), key=lambda one: float(one.value.sum())), None
@@ -86,7 +93,7 @@ class SlidingWindow:
         self.spent += newest
         self._usual = newest if np.isinf(self._usual) else 0.9 * self._usual + 0.1 * newest
         self.state = found.state
-        return self.model.estimate(self._frame, W, visible, self.state)
+        return replace(self.model.estimate(self._frame, W, visible, self.state), switch=self._switch)
 
     def restart(self) -> None:
         """The surface was lost: the next frame is tied to nothing, and starts from the rest or from the last shape."""
@@ -100,6 +107,16 @@ class SlidingWindow:
             return None
         last = self.state[-1:]
         return self.model.projection(extrapolated(self.state[-2:-1], last) if len(self.state) > 1 else last).T
+
+    def _without_oldest(self, window: State) -> State:
+        """The window without its oldest frame, about the rest shape that this frame refines."""
+        self._before, data = window[:1], self._data.pop(0)
+        if self._refine:
+            self._rest.take(data, self._before)
+            self._energy = self._energy.about(self._rest.rest)
+            self._before = at_rest(self._before, self._rest.rest, self._energy.rows)
+            window = at_rest(window, self._rest.rest, self._energy.rows)
+        return window[1:]
 
     def _adjust(self, start: State) -> Solution:
         return minimise(self._energy, stack(self._data), start, self._before, Solver())
@@ -127,13 +144,15 @@ class SlidingWindow:
 
         Edge lengths make the energy of Λ non-convex: a sheet bent one way or the other looks alike.
         """
+        best, rest = found, self._rest.rest
         for factors in OTHER_BENDS:
-            Lambda = found.state.Lambda.copy()
-            Lambda[-1] *= factors
-            other = self._adjust(replace(found.state, Lambda=Lambda))
-            if other.value.sum() < BENT_GAIN * found.value.sum():
-                found = other
-        return found
+            Lambda = best.state.Lambda.copy()
+            Lambda[-1] = rest + factors * (Lambda[-1] - rest)
+            other = self._adjust(replace(best.state, Lambda=Lambda))
+            if other.value.sum() < BENT_GAIN * best.value.sum():
+                best = other
+        self._switch = switch_between(found, best)
+        return best
 
     def _first_state(self, W: Array, visible: Visibility) -> State:
         """Pose of the first frame with nothing deformed: that of the bootstrap, or a clearly better tilt."""
@@ -145,13 +164,14 @@ class SlidingWindow:
         q = quaternion_from_rotation(self._motion.R[0] @ model.basis.Phi)
         start = State(q[None], seen.mean(axis=1)[None] / model.radius, np.array([log_s]), np.zeros((1, 3, 0)))
         energy = pose_energy(model.camera)
-        found = minimise(energy, data, start, None, Solver())
+        found = best = minimise(energy, data, start, None, Solver())
         for tilt in FIRST_TILT * tilt_axes():
             tilted = replace(start, q=quaternion_product(quaternion_exp(tilt), q)[None])
             other = minimise(energy, data, tilted, None, Solver())
-            if other.value[0] < TILT_GAIN * found.value[0]:
-                found = other
-        return replace(found.state, Lambda=np.zeros((1, 3, len(model.basis.eigenvalues))))
+            if other.value[0] < TILT_GAIN * best.value[0]:
+                best = other
+        self._switch = switch_between(found, best)
+        return replace(best.state, Lambda=self._rest.rest[None].copy())
 
 
 def extrapolated(earlier: State, last: State) -> State:

@@ -6,7 +6,6 @@ from typing import cast
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -112,5 +111,6 @@ def both_ways(before: Image, now: Image, points: Array, guess: Array, window: in
 
 
 def _median_of_nearest(points: Array, guides: Array, motion: Array) -> Array:
-    nearest = cKDTree(guides).query(points, k=VOTES)[1]
+    near, far = guides.astype(np.float32), points.astype(np.float32)
+    nearest = cv2.batchDistance(far, near, cv2.CV_32F, normType=cv2.NORM_L2SQR, K=VOTES)[1]
     return cast(Array, np.sort(motion.T[:, nearest], axis=2)[:, :, VOTES // 2 - 1 : VOTES // 2 + 1].mean(axis=2).T)

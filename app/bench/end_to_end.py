@@ -87,7 +87,8 @@ def many_points(say: Say) -> tuple[int, float]:
 def evaluate_many() -> int:
     """Tracks of a surface that turns, reconstructed from its first true shape; returns the number of points."""
     from app.bench.problems import FOCAL_PX, surface
-    from app.config import Evaluate, Model
+    from app.config import Evaluate
+    from app.config_model import Model
     from app.evaluate import evaluate
     from app.progress import Progress
     from reconstruction.camera import quaternion_exp, rotation_from_quaternion

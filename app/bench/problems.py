@@ -7,11 +7,12 @@ from numpy.typing import NDArray
 
 from reconstruction.camera import Camera, quaternion_exp, quaternion_product
 from reconstruction.constraints import ROWS
-from reconstruction.energy import Energy, State, join
+from reconstruction.energy import Energy
 from reconstruction.mesh import Mesh, triangulate
 from reconstruction.model import Model
 from reconstruction.modes import modal_basis
 from reconstruction.solver import Solver, minimise
+from reconstruction.state import State, join
 from reconstruction.statistics import Statistics, frame_statistics, stack
 
 Array = NDArray[np.float64]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from app.bench.problems import WindowStep
 from reconstruction.camera import SANDWICH, rotation_from_quaternion
-from reconstruction.energy import State
+from reconstruction.state import State
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class FrameData:
 def change_weights(step: WindowStep) -> Array:
     """Roots of the weights on a frame's change (7 + k,): of q, t, log s and the free rows of Λ'."""
     energy, k = step.energy, len(step.energy.rows) * step.modes
-    weights = [energy.rotation] * 4 + [energy.translation] * 2 + [energy.scale] + [energy.deformation] * k
+    weights = [energy.rotation] * 4 + [energy.translation] * 2 + [energy.scale] + [energy.smoothness] * k
     return np.sqrt(weights)
 
 

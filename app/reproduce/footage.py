@@ -5,7 +5,8 @@ from functools import partial
 
 import numpy as np
 
-from app.config import Model, Output, Run
+from app.config import Output, Run
+from app.config_model import Model
 from app.demo import sample as made_sample
 from app.playback import Playback
 from app.reproduce.chart import Panel, Series, charts

@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.config import Evaluate, Model
+from app.config import Evaluate
+from app.config_model import Model
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from app.config import Evaluate, Model
+from app.config import Evaluate
+from app.config_model import Model
 from app.reproduce.chart import Panel, Series, charts
 from app.reproduce.experiment import Experiment
 from app.reproduce.organ import NOISE_PX, POINTS, REST_FRAMES, organ_tracks

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.config import Model, Output, Run
+from app.config import Output, Run
+from app.config_model import Model
 from app.playback import Playback
 from app.progress import Progress
 from app.session import Session

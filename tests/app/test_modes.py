@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from app import entities
-from app.config import Model, Output
+from app.config import Output
 from app.config import Run as Asked
 from app.config_export import Modes
+from app.config_model import Model
 from app.errors import UsageError
 from app.modes import modes, spectrum
 from app.modes_figure import AMPLITUDE, View, boundary, brightness, displaced, modes_figure

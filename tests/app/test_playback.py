@@ -11,7 +11,8 @@ import rerun as rr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.config import Model, Output, Run
+from app.config import Output, Run
+from app.config_model import Model
 from app.errors import UsageError
 from app.playback import Playback
 from app.progress import Progress

@@ -1,16 +1,22 @@
 """The frame loop: frame numbers, stages, interrupts at awkward moments."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from app.config import Model, Output, Run
+from app.config import Output, Run
+from app.config_model import Model
 from app.errors import UsageError
 from app.parts import free_name
+from app.playback import Playback
 from app.progress import Progress
 from app.session import Session
 from reconstruction import ReconstructionError
+from reconstruction.ambiguity import Switch
+from reconstruction.model import ShapeEstimate
+from reconstruction.window import SlidingWindow
 from tests.synthetic_run import verify
 
 
@@ -108,3 +114,33 @@ def test_recordings_are_named_after_their_source(source: str, name: str, here: P
     (here / f"{name}.rrd").touch()
     (here / f"{name}-2.rrd").touch()
     assert free_name(here, source) == here / f"{name}-3.rrd"
+
+
+def test_priors_are_recorded_as_they_were_asked_for_and_as_they_were(videos: Path) -> None:
+    asked = config(videos)
+    words = Session(replace(asked, model=replace(asked.model, priors="rest=0.5, scale=0")), Progress()).run()
+    playback = Playback.load(Path("run.rrd"))
+    assert playback.configuration["priors"] == "rest=0.5, scale=0"
+    assert playback.summary is not None
+    assert playback.summary["priors"] == words["priors"]
+    assert words["priors"] == {
+        "rest": 0.5, "smoothness": 1e-3, "rotation": 3e-4, "translation": 0.0, "scale": 0.0, "inextensibility": 3.0,
+    }  # fmt: skip
+
+
+def test_a_switch_of_branches_is_told_and_counted(
+    videos: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    advance = SlidingWindow.advance
+
+    def switching(self: SlidingWindow, W: np.ndarray, visible: np.ndarray) -> ShapeEstimate:
+        estimate = advance(self, W, visible)
+        return replace(estimate, switch=Switch(-0.5, 0.0, 0.62)) if estimate.frame == 4 else estimate
+
+    monkeypatch.setattr(SlidingWindow, "advance", switching)
+    words = Session(config(videos, "7:25"), Progress()).run()
+    told = "bent back at frame 11: energy 0.62 of the other branch"
+    assert words["branch_switches"] == 1
+    assert told in capsys.readouterr().err
+    events = [(frame, level, text) for frame, _, level, text in Playback.load(Path("run.rrd")).events]
+    assert (11, "WARN", told) in events

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.config import Model, Output, Run
+from app.config import Output, Run
+from app.config_model import Model
 from app.config_retexture import Retexture
 from app.observer import Observer
 from app.parts import beside

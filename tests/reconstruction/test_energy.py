@@ -11,18 +11,16 @@ from hypothesis import strategies as st
 from reconstruction import statistics
 from reconstruction.energy import (
     HAT,
-    POSE,
     Energy,
-    State,
     edge_strain,
     edge_vectors,
     evaluate,
-    join,
     linearise,
     quaternion_difference,
     smoothness,
 )
 from reconstruction.model import Model
+from reconstruction.state import POSE, State, join
 from reconstruction.statistics import Statistics
 from tests.reconstruction.world import (
     CAMERAS,
@@ -36,7 +34,7 @@ from tests.reconstruction.world import (
 )
 
 FRAMES, MODES, POINTS = 3, 3, 25
-SILENT = Energy(rotation=0.0, translation=0.0, scale=0.0, deformation=0.0, rest=0.0)
+SILENT = Energy(rotation=0.0, translation=0.0, scale=0.0, smoothness=0.0, rest=0.0)
 ROWS = st.sampled_from([(0, 1, 2), (2,), (0, 1), ()])
 
 
@@ -72,7 +70,7 @@ def terms(scene: Scene) -> dict[str, Energy]:
         "rotation": replace(SILENT, rotation=0.7),
         "translation": replace(SILENT, translation=0.4),
         "scale": replace(SILENT, scale=0.6),
-        "deformation": replace(SILENT, deformation=0.3),
+        "smoothness": replace(SILENT, smoothness=0.3),
         "rest": replace(SILENT, rest=0.9),
         "inextensibility": replace(SILENT, inextensibility=2.0, edges=edges),
     }
@@ -84,7 +82,7 @@ def everything(scene: Scene, rows: tuple[int, ...], *, tied: bool) -> Energy:
         rotation=0.7,
         translation=0.4,
         scale=0.6,
-        deformation=0.3,
+        smoothness=0.3,
         rest=np.array([0.5, 0.9, 1.3]),
         inextensibility=2.0,
         rows=rows,
@@ -122,7 +120,7 @@ def replace_states(scene: Scene, state: State) -> Scene:
     return replace(scene, state=state, before=before)
 
 
-@pytest.mark.parametrize("term", ["rotation", "translation", "scale", "deformation", "rest", "inextensibility"])
+@pytest.mark.parametrize("term", ["rotation", "translation", "scale", "smoothness", "rest", "inextensibility"])
 @settings(max_examples=10)
 @given(rng=SEEDS, tied=st.booleans())
 def test_gradient_of_each_prior(term: str, rng: np.random.Generator, tied: bool) -> None:
@@ -169,7 +167,7 @@ def residuals(energy: Energy, scene: Scene, state: State) -> np.ndarray:
         parts.append(np.sqrt(energy.rotation) * (chain.q[b] - sign * chain.q[a]))
         parts.append(np.sqrt(energy.translation) * (chain.t[b] - chain.t[a]))
         parts.append(np.sqrt(energy.scale) * (chain.log_s[b] - chain.log_s[a]))
-        parts.append(np.sqrt(energy.deformation) * (chain.Lambda[b] - chain.Lambda[a]))
+        parts.append(np.sqrt(energy.smoothness) * (chain.Lambda[b] - chain.Lambda[a]))
     return np.concatenate([np.ravel(part) for part in parts])
 
 

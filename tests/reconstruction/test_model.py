@@ -6,8 +6,8 @@ from hypothesis import given
 
 from reconstruction import statistics
 from reconstruction.camera import Camera, rotation_from_quaternion
-from reconstruction.energy import State
 from reconstruction.model import Model
+from reconstruction.state import State
 from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, flat, model_of, random_state, relief
 
 POINTS, MODES = 40, 5

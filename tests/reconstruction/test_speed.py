@@ -7,10 +7,11 @@ import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
 from threadpoolctl import threadpool_limits
 
-from reconstruction.energy import Energy, State, linearise
+from reconstruction.energy import Energy, linearise
 from reconstruction.mesh import triangulate
 from reconstruction.modes import modal_basis
 from reconstruction.solver import Solver, damped_step, minimise
+from reconstruction.state import State
 from reconstruction.statistics import Statistics, frame_statistics, stack
 from tests.reconstruction.world import relief
 

@@ -5,10 +5,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from reconstruction.camera import Camera, nearest_rotation, quaternion_exp, rotation_from_quaternion
-from reconstruction.energy import State
 from reconstruction.mesh import triangulate
 from reconstruction.model import Model
 from reconstruction.modes import Metric, modal_basis
+from reconstruction.state import State
 from reconstruction.statistics import Statistics, stack
 
 Array = NDArray[np.float64]

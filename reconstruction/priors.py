@@ -1,0 +1,109 @@
+"""The priors of the energy by name: formula, weight, and when to use them (paper §5, §3.4).
+
+Each is a sum of squares of dimensionless quantities (lengths in units of the rest shape's size), added for every frame to
+the mean squared reprojection error; any weights go together. The terms themselves are in `energy`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from reconstruction import ReconstructionError
+
+Weights = dict[str, float]
+
+ORTHOGRAPHIC_SCALE = 1.0  # λ_s without depth, where only a zoom changes the scale
+PERSPECTIVE_SCALE = 1e-3  # λ_s with depth, where moving towards the camera does
+OTHERWISE = "otherwise"
+
+
+@dataclass(frozen=True)
+class Prior:
+    """One term of the energy that does not come from the images.
+
+    Attributes:
+        formula: the term; Δ is the change since the frame before.
+        use: what it is for, and when to change its weight.
+        default: weight by deformation, or by camera (perspective, orthographic), or otherwise.
+    """
+
+    formula: str
+    use: str
+    default: Mapping[str, float]
+
+    def weight(self, deformation: str, camera: str) -> float:
+        """The weight unless somebody chooses another."""
+        return next(self.default[case] for case in (deformation, camera, OTHERWISE) if case in self.default)
+
+
+PRIORS: dict[str, Prior] = {
+    "rest": Prior(
+        "λ_0 Σ_k ω_k ‖Λ'_k − Λ̄'_k‖², ω_k ∝ eigenvalue_k^(−½)",
+        "Pulls to the rest shape, weak modes harder. Without it, modes 1 and 2 do what tilt and scale should. More where "
+        "points are few or noisy, less where the surface deforms far.",
+        {"bending": 1e-2, "inextensible": 1e-3, OTHERWISE: 2e-2},
+    ),
+    "smoothness": Prior(
+        "λ_γ ‖ΔΛ'‖²",
+        "The deformation changes slowly. More for noisy or missing points and high frame rates, less for fast motion.",
+        {"bending": 1e-3, "inextensible": 1e-3, OTHERWISE: 3e-2},
+    ),
+    "rotation": Prior(
+        "λ_q ‖Δq‖²",
+        "The object turns slowly (q is the unit quaternion). More where the pose jitters.",
+        {OTHERWISE: 3e-4},
+    ),
+    "translation": Prior(
+        "λ_t ‖Δt‖²",
+        "The object stays where it is in the picture. The images tell t so well that it is hardly ever of use.",
+        {OTHERWISE: 0.0},
+    ),
+    "scale": Prior(
+        "λ_s (Δ log s)²",
+        "The object stays as far away. Less for an orthographic camera that zooms, more for a perspective one before which "
+        "the object only turns. Of no effect with `--energy paper`, where s = 1.",
+        {"orthographic": ORTHOGRAPHIC_SCALE, "perspective": PERSPECTIVE_SCALE},
+    ),
+    "inextensibility": Prior(
+        "κ mean_e ρ_e², ρ_e = (‖d_e‖² − l_e²) / (2 l_e)",
+        "The edges d_e of a coarse mesh keep their lengths l_e: paper, cloth. Less for what stretches somewhat, or for a "
+        "rest shape that is only roughly known; none for skin and rubber.",
+        {"inextensible": 3.0, OTHERWISE: 0.0},
+    ),
+}
+# The energy of the paper as printed: nothing pulls to rest.
+PAPER: Weights = {"rest": 0.0, "smoothness": 1e-3, "inextensibility": 0.0}
+
+
+def weights(chosen: Mapping[str, float], deformation: str, *, perspective: bool, paper: bool) -> Weights:
+    """All weights by name: those chosen, and for the others the defaults, or the paper's.
+
+    Raises:
+        ReconstructionError: a name that no prior has, or a weight that is none.
+    """
+    check(chosen)
+    camera = "perspective" if perspective else "orthographic"
+    defaults = {name: prior.weight(deformation, camera) for name, prior in PRIORS.items()}
+    return defaults | (PAPER if paper else {}) | dict(chosen)
+
+
+def check(chosen: Mapping[str, float]) -> None:
+    """See to it that weights can be chosen so.
+
+    Raises:
+        ReconstructionError: a name that no prior has, or a weight that is none.
+    """
+    for name, weight in chosen.items():
+        if name not in PRIORS:
+            raise ReconstructionError(f"there is no prior {name}: choose from {', '.join(PRIORS)}")
+        if not 0 <= weight < float("inf"):
+            raise ReconstructionError(f"{weight:g} is no weight for the prior {name}: give 0 (to leave it out) or more")
+
+
+def table() -> str:
+    """All priors as a table in Markdown."""
+    rows = ["| prior | formula | weight unless given | when to use |", "|---|---|---|---|"]
+    for name, prior in PRIORS.items():
+        cases = ", ".join(f"{case} {weight:g}" for case, weight in prior.default.items())
+        default = cases if len(prior.default) > 1 else f"{prior.default.get(OTHERWISE):g}"
+        rows.append(f"| `{name}` | {prior.formula} | {default} | {prior.use} |")
+    return "\n".join(rows)

@@ -1,0 +1,56 @@
+"""A rest shape that keeps improving: frames that have left the window go on to say where the surface rests (paper §4).
+
+It moves within the span of its modes, S̄ + ΦΛ̄Υ, so that modes, model and S = S̄ + ΦΛΥ stay what they are and only the
+coefficients Λ̄ of the surface at rest are estimated. A frame's data term is quadratic in Λ, so frames with settled pose and
+deformation add up to one normal system for a shift that they all share; no point is touched again.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction.energy import Energy, Normal, add_data
+from reconstruction.state import POSE, State
+from reconstruction.statistics import Statistics
+
+Array = NDArray[np.float64]
+
+PULL = 2.0  # towards the first rest shape; a frame in which all points are seen weighs about 1
+KEPT = 0.98  # of what is known, frame by frame: some 50 frames count
+FEWEST = 5  # frames; fewer turn too little to tell rest from pose
+ALL_ROWS = Energy(rows=(0, 1, 2))
+
+
+class Refinement:
+    """Where the surface rests, by the frames so far; one public verb.
+
+    Args:
+        modes: r.
+
+    Attributes:
+        rest: (3, r) Λ̄', zero for the rest shape of the first frames.
+    """
+
+    def __init__(self, modes: int) -> None:
+        self.rest: Array = np.zeros((3, modes))
+        self._hessian, self._right = np.zeros((3 * modes, 3 * modes)), np.zeros(3 * modes)
+        self._frames = 0
+
+    def take(self, data: Statistics, state: State) -> None:
+        """Learn from one settled frame (n = 1), which was deformed about the rest as it is now."""
+        d = POSE + self.rest.size
+        normal = Normal(np.zeros(1), np.zeros((1, d)), np.zeros((1, d, d)), np.zeros((0, d, d)))
+        add_data(normal, ALL_ROWS, data, state)
+        hessian, gradient = normal.diagonal[0, POSE:, POSE:], normal.gradient[0, POSE:]
+        self._hessian = KEPT * self._hessian + hessian
+        self._right = KEPT * self._right + hessian @ self.rest.ravel() - gradient
+        self._frames += 1
+        if self._frames >= FEWEST:
+            pulled = self._hessian + PULL * np.eye(self.rest.size)
+            self.rest = np.asarray(np.linalg.solve(pulled, self._right)).reshape(self.rest.shape)
+
+
+def at_rest(state: State, rest: Array, rows: tuple[int, ...]) -> State:
+    """The state with all but the given rows of Λ' as they are at rest (3, r)."""
+    Lambda = np.broadcast_to(rest, state.Lambda.shape).copy()
+    Lambda[:, rows, :] = state.Lambda[:, rows, :]
+    return State(state.q, state.t, state.log_s, Lambda)
