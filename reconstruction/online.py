@@ -14,6 +14,7 @@ from reconstruction.constraints import Deformation, build_energy, chosen
 from reconstruction.mesh import Mesh
 from reconstruction.model import Model, ShapeEstimate, build_model
 from reconstruction.modes import Metric
+from reconstruction.outliers import without_outliers
 from reconstruction.priors import Weights
 from reconstruction.rest_shape import RestShape
 from reconstruction.window import SlidingWindow
@@ -155,7 +156,7 @@ class Reconstruction:
 
     def _decide(self, last: bool) -> list[ShapeEstimate]:
         W = np.stack([w for w, _ in self._waiting])
-        visible = np.stack([v for _, v in self._waiting])
+        visible = without_outliers(W, np.stack([v for _, v in self._waiting]))
         kind = self.settings.rest_shape
         if kind == "plane":
             return self._recover("plane", W, visible)

@@ -5,7 +5,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
@@ -118,7 +117,7 @@ def rigid(W: Array, visible: Visibility, camera: Camera) -> RestShape:
 
 
 def factorize_often_seen(W: Array, visible: Visibility) -> RigidMotion:
-    """Factorise the points seen in enough frames; the others start at their image and their neighbours' depth.
+    """Factorise the points seen in enough frames; the others start where they are seen, as deep as those beside them.
 
     Raises:
         ReconstructionError: too few frames or points.
@@ -127,13 +126,14 @@ def factorize_often_seen(W: Array, visible: Visibility) -> RigidMotion:
     if often.sum() < 4:
         raise ReconstructionError("cannot recover a rest shape: fewer than 4 points stay visible; give --rest-shape plane")
     motion = factorize(W[:, :, often], visible[:, often]).motion
-    image = first_image(W, visible)
     shape = np.zeros((3, W.shape[2]))
-    shape[:2] = image - motion.t[0][:, None]
     shape[:, often] = motion.shape
-    if not often.all():
-        nearest = cKDTree(image[:, often].T).query(image[:, ~often].T, k=min(4, int(often.sum())))[1]
-        shape[2, ~often] = motion.shape[2][nearest].mean(axis=-1)
+    for i in np.flatnonzero(~often & visible.any(axis=0)):
+        f = int(visible[:, i].argmax())
+        placed = motion.s[f] * motion.R[f] @ motion.shape
+        place = W[f, :, i] - motion.t[f]
+        beside = np.argsort(((placed[:2].T - place) ** 2).sum(axis=1))[:4]
+        shape[:, i] = motion.R[f].T @ np.append(place, placed[2, beside].mean()) / motion.s[f]
     return replace(motion, shape=shape)
 
 

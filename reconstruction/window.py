@@ -15,6 +15,7 @@ from reconstruction.camera import (
 )
 from reconstruction.energy import Energy
 from reconstruction.model import Model, ShapeEstimate
+from reconstruction.outliers import LEAST_SIGMA, off_the_common_motion
 from reconstruction.refinement import Refinement, at_rest
 from reconstruction.rest_shape import tilt_axes
 from reconstruction.rigid import RigidMotion, pose_energy
@@ -28,6 +29,7 @@ Visibility = NDArray[np.bool_]
 FEWEST_POINTS = 4
 ROBUST_SIGMAS = 8.0  # deviations from the model beyond which a point counts less
 GROSS_SIGMAS = 7.0  # deviations from the common motion beyond which a point is no sound start
+TRUSTED = 0.5  # weight above which a point says where the first frame is
 REWEIGHTINGS = 5  # most rounds of robust weights: one for clean points, more while gross outliers still pull
 REWEIGHTED = 0.005  # share of the weights that must change for another round
 CALM = 1e-5  # energy of a new frame (a misfit of 0.3 % of the size) that is no surprise whatever was usual
@@ -75,7 +77,9 @@ class SlidingWindow:
         self._switch = None
         weights = self._first_weights(W, visible)
         self._data.append(self.model.statistics(W, weights))
-        window = self._first_state(W, visible) if self.state is None else join([self.state, self._leant(self.state[-1:])])
+        window = (
+            self._first_state(W, weights > 0.5) if self.state is None else join([self.state, self._leant(self.state[-1:])])
+        )
         if len(window) > self._length:
             window = self._without_oldest(window)
         found = self._adjust(window)
@@ -122,11 +126,16 @@ class SlidingWindow:
         return minimise(self._energy, stack(self._data), start, self._before, Solver())
 
     def _first_weights(self, W: Array, visible: Visibility) -> Array:
-        """Visibility (p,) without the points whose motion since the last frame is out of all proportion."""
-        if self.state is None or visible.sum() < FEWEST_POINTS:
+        """Visibility (p,) without the points whose motion since the last shape is out of all proportion."""
+        if visible.sum() < FEWEST_POINTS:
             return visible.astype(np.float64)
-        motion = self.model.residuals(W, self.state)
-        return robust_weights(motion - np.median(motion[:, visible], axis=1)[:, None], visible, GROSS_SIGMAS)
+        if self.state is None:
+            last = self._motion.R[0] @ self._motion.shape
+        else:
+            last = self.model.radius * (self.state.matrices()[-1] @ self.model.B)
+        last = last / (1 + last[2] / self.model.camera.focal_px)
+        off = off_the_common_motion(last, W, visible, GROSS_SIGMAS)
+        return robust_weights(off, visible, GROSS_SIGMAS, LEAST_SIGMA * self.model.radius)
 
     def _leant(self, last: State) -> State:
         """Where a new frame starts: as the last one, but never facing an orthographic camera exactly.
@@ -180,7 +189,7 @@ def extrapolated(earlier: State, last: State) -> State:
     return State(turned, 2 * last.t - earlier.t, 2 * last.log_s - earlier.log_s, 2 * last.Lambda - earlier.Lambda)
 
 
-def robust_weights(residuals: Array, visible: Visibility, sigmas: float = ROBUST_SIGMAS) -> Array:
+def robust_weights(residuals: Array, visible: Visibility, sigmas: float = ROBUST_SIGMAS, least: float = 0.0) -> Array:
     """Weights (p,) that let points so many deviations of the residuals (2, p) px away count little (Geman-McClure).
 
     Few deviations would also silence bends that the modes cannot follow.
@@ -188,6 +197,6 @@ def robust_weights(residuals: Array, visible: Visibility, sigmas: float = ROBUST
     if visible.sum() < FEWEST_POINTS:
         return visible.astype(np.float64)
     distance = np.linalg.norm(np.where(visible, residuals, 0.0), axis=0)
-    sigma = np.median(distance[visible]) / 1.1774  # median of a Rayleigh distribution
+    sigma = max(np.median(distance[visible]) / 1.1774, least)  # median of a Rayleigh distribution
     excess = np.maximum(distance / max(sigmas * sigma, 1e-9), 1.0)
     return np.where(visible, excess**-4.0, 0.0)

@@ -64,6 +64,19 @@ def test_missing_points_and_outliers_cost_little(
     assert e3d(option, share, "--seed", seed) <= factor * e3d()
 
 
+@pytest.mark.parametrize(("share", "missing", "factor"), [(0.1, 0.0, 1.2), (0.2, 0.0, 1.4), (0.1, 0.4, 1.4)])
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_solid_recovered_among_outliers_costs_little(
+    modeshape: Command, shared_data: Path, share: float, missing: float, factor: float, seed: int
+) -> None:
+    outcome = modeshape(
+        "evaluate", shared_data / "face37.npz", "--rest-shape", "rigid", "--modes", 30, "--deformation", "general",
+        "--outliers", share, "--missing", missing, "--seed", seed, "--json",
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    assert json.loads(outcome.out)["e3d"] <= factor * 0.030
+
+
 def test_more_modes_explain_more(modeshape: Command, shared_data: Path) -> None:
     errors = []
     for modes in (5, 10, 20, 30):

@@ -8,7 +8,7 @@ import pytest
 from reconstruction import ReconstructionError, rest_shape
 from reconstruction.camera import Camera
 from reconstruction.constraints import Deformation
-from reconstruction.evaluation import e3d
+from reconstruction.evaluation import e3d, with_missing, with_outliers
 from reconstruction.model import ShapeEstimate
 from reconstruction.online import Phase, Reconstruction, Settings
 from reconstruction.window import robust_weights
@@ -320,3 +320,21 @@ def test_robust_weights_spare_the_crowd() -> None:
     assert weights[:5].max() < 0.05
     assert weights[5:95].min() > 0.9
     np.testing.assert_array_equal(weights[95:], 0.0)
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.4])
+def test_a_turning_solid_is_recovered_among_gross_outliers(missing: float) -> None:
+    rng = np.random.default_rng(5)
+    shape = relief(rng, 60)
+    swell = 1 + 0.08 * np.sin(np.arange(40) / 4)[:, None, None] * np.array([[1.0], [0.3], [1.0]])
+    W, truth = seen(swell * shape, turns(40, 35.0), PERSPECTIVE)
+    visible = with_missing(np.ones((40, 60), bool), missing, rng)
+    settings = Settings(rest_shape="rigid", deformation="general")
+    errors = {}
+    for share in (0.0, 0.15):
+        wild = with_outliers(W, visible, share, rng)
+        reconstruction, estimates = Reconstruction(PERSPECTIVE, settings), []
+        for w, h in zip(wild, visible, strict=True):
+            estimates += reconstruction.update(np.where(h, w, np.nan), h)
+        errors[share] = error(estimates + reconstruction.finish(), truth)
+    assert errors[0.15] < 1.3 * errors[0.0] + 0.005, errors

@@ -222,3 +222,14 @@ def test_a_sheet_that_bends_later_is_judged_by_its_flat_frames() -> None:
     found = rest_shape.plane(W, np.ones((frames, POINTS), bool), PERSPECTIVE)
     assert "tilted" in found.note
     assert shape_error(found.motion.R[0] @ found.motion.shape, R[0] @ sheet) < 0.02
+
+
+def test_a_point_seen_once_is_put_among_what_is_seen_beside_it() -> None:
+    rng = np.random.default_rng(6)
+    shape = relief(rng, POINTS)
+    W, visible = views(shape, turns(FRAMES, 60.0), ORTHOGRAPHIC)
+    visible[:, 7] = False
+    visible[9, 7] = True  # where the object is turned by 60° against the first frame
+    found = rest_shape.rigid(np.where(visible[:, None], W, np.nan), visible, ORTHOGRAPHIC).motion.shape
+    found = min((m @ found for m in (np.eye(3), np.diag([1.0, 1.0, -1.0]))), key=lambda S: float(np.abs(S - shape).sum()))
+    assert np.linalg.norm(found[:, 7] - shape[:, 7]) < 0.4 * np.sqrt((shape**2).sum() / POINTS)
