@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from reconstruction import ReconstructionError, focal, priors, rest_shape
 from reconstruction.camera import Camera
 from reconstruction.constraints import Deformation, build_energy, chosen
+from reconstruction.factorization import view_turn_degrees
 from reconstruction.mesh import Mesh
 from reconstruction.model import Model, ShapeEstimate, build_model
 from reconstruction.modes import Metric
 from reconstruction.outliers import without_outliers
 from reconstruction.priors import Weights
-from reconstruction.rest_shape import RestShape
+from reconstruction.rest_shape import TURN_DEGREES, RestShape
 from reconstruction.window import SlidingWindow
 
 Array = NDArray[np.float64]
@@ -166,7 +167,12 @@ class Reconstruction:
         if len(W) >= BOOTSTRAP_SCHEDULE[0]:
             doubt = rest_shape.weigh(W, visible).doubt
             if not doubt:
-                return self._recover("rigid", W, visible)
+                rest = rest_shape.rigid(W, visible, self.camera)
+                turn = view_turn_degrees(rest.motion.R)
+                if kind == "rigid" or turn >= TURN_DEGREES:
+                    return self._recover("rigid", W, visible, rest=rest)
+                # Things that move by themselves pass for parallax until perspective is reckoned with.
+                doubt = f"the object turned {turn:.1f}° in {len(W)} frames, about {TURN_DEGREES:.0f}° are needed"
         if not last:
             return []
         if kind == "rigid":
@@ -175,10 +181,12 @@ class Reconstruction:
             )
         return self._recover("plane", W, visible, f" (no rigid shape: {doubt})")
 
-    def _recover(self, kind: str, W: Array, visible: Visibility, remark: str = "") -> list[ShapeEstimate]:
-        """The rest shape of the first frames (F, 2, p), by the focal length that they hold."""
+    def _recover(
+        self, kind: str, W: Array, visible: Visibility, remark: str = "", rest: RestShape | None = None
+    ) -> list[ShapeEstimate]:
+        """The rest shape of the first frames (F, 2, p), if it is not there yet, by the focal length that they hold."""
         recovery = rest_shape.rigid if kind == "rigid" else rest_shape.plane
-        rest = recovery(W, visible, self.camera)
+        rest = rest or recovery(W, visible, self.camera)
         if self.settings.estimate_focal and self.camera.perspective:
             found = focal.estimate(W, visible, self.camera, rest, self.deformation, self.settings.priors)
             self.camera, self.focal_note = replace(self.camera, focal_px=found.focal_px), found.note

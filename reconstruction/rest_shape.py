@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError
-from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
+from reconstruction.camera import Camera
 from reconstruction.factorization import Factorization, affine_structure, factorize, view_turn_degrees
 from reconstruction.mesh import farthest_points
-from reconstruction.rigid import RigidMotion, bundle_adjust, follow, solve_points
+from reconstruction.rigid import RigidMotion, bundle_adjust, follow
+from reconstruction.sheet import best_tilted, sheet
 
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
@@ -21,8 +22,8 @@ RELIEF_OVER_NOISE = 3.0  # third over fourth singular value of the observations
 HALVES_AGREE = 0.10  # relative difference of the shapes of even and odd frames
 JUDGING_POINTS = 150  # well-spread points are enough to decide on
 FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
-TILT_DEGREES = 25.0  # tilts a flat sheet is started from
 TILT_GAIN = 0.7  # a tilt is believed when it lowers the reprojection error below this share of the frontal one's
+SHARP = 2.0  # times worse that a clearly other tilt fits, where the tilt shows even in a smaller turn
 BENT_PX = 1.0  # reprojection error above which a sheet is not flat in all frames
 FEWEST_FLAT = 10  # frames that tell a tilt
 STILL_PX = 0.5  # apparent motion, beyond that of a similarity, that is not noise
@@ -152,14 +153,12 @@ def plane(W: Array, visible: Visibility, camera: Camera) -> RestShape:
         return RestShape("plane", frontal, "flat sheet facing the camera: the first frames show no turn")
     frames = np.unique(np.linspace(0, len(W) - 1, 16).astype(int))
     W_few, visible_few = W[frames][:, :, chosen], visible[frames][:, chosen]
-    tilts = quaternion_exp(np.deg2rad(TILT_DEGREES) * np.concatenate([np.zeros((1, 3)), tilt_axes()]))
-    starts = [sheet(first[:, chosen], R, camera) for R in rotation_from_quaternion(tilts)]
-    ahead, *leaning = follow(W_few, visible_few, starts, camera)
+    (ahead,) = follow(W_few, visible_few, [sheet(first[:, chosen], np.eye(3), camera)], camera)
     level = bundle_adjust(W_few, visible_few, ahead, camera, sweeps=1)
-    found = [bundle_adjust(W_few, visible_few, start, camera, flat=True, sweeps=15) for start in leaning]
-    tilted = min(found, key=lambda result: result[1])
+    start, sharpness = best_tilted(first[:, chosen], W_few, visible_few, camera)
+    tilted = bundle_adjust(W_few, visible_few, start, camera, flat=True, sweeps=15)
     turn = view_turn_degrees(tilted[0].R)
-    if tilted[1] > TILT_GAIN * level[1] or turn < TURN_DEGREES:
+    if tilted[1] > TILT_GAIN * level[1] or (turn < TURN_DEGREES and sharpness < SHARP):
         if tilted[1] > BENT_PX and len(W) >= 2 * FEWEST_FLAT:  # it bends meanwhile: judge by the frames before
             return plane(W[: len(W) // 2], visible[: len(W) // 2], camera)
         note = f"flat sheet facing the camera: its tilt does not show in {len(W)} frames"
@@ -175,20 +174,6 @@ def given(shape: Array, kind: Kind, note: str) -> RestShape:
     shape = shape - shape.mean(axis=1, keepdims=True)
     motion = RigidMotion(shape, np.eye(3)[None], np.ones(1), np.zeros((1, 2)))
     return RestShape(kind, motion, note)
-
-
-def sheet(image: Array, R: Array, camera: Camera) -> RigidMotion:
-    """The flat sheet in the plane turned by R (3, 3) that looks like the image (2, p) px."""
-    W = image - camera.center_px[:, None]
-    t = W.mean(axis=1)
-    motion = RigidMotion(np.zeros((3, W.shape[1])), R[None], np.ones(1), t[None])
-    shape = solve_points(W[None], np.ones((1, W.shape[1])), motion, camera, flat=True)
-    return replace(motion, shape=shape)
-
-
-def tilt_axes() -> Array:
-    """(4, 3) unit rotation axes in the image plane."""
-    return np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
 
 
 def first_image(W: Array, visible: Visibility) -> Array:

@@ -10,7 +10,7 @@ from reconstruction.energy import Energy
 from reconstruction.priors import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE
 from reconstruction.solver import Solver, minimise
 from reconstruction.state import State
-from reconstruction.statistics import Statistics, pose_statistics, stack
+from reconstruction.statistics import Statistics, pose_statistics
 
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
@@ -103,8 +103,9 @@ def follow(W: Array, visible: Visibility, starts: list[RigidMotion], camera: Cam
     q = quaternion_from_rotation(np.concatenate([start.R for start in starts]))
     t, s = (np.concatenate([getattr(start, name) for start in starts]) for name in ("t", "s"))
     now, path = State(q, t / radius[:, None], np.log(s), np.zeros((len(starts), 3, 0))), []
-    for f in range(len(W)):
-        data = stack([pose_data(W[f : f + 1], h[f : f + 1], start.shape, camera) for start in starts])
+    every = [pose_data(W, h, start.shape, camera) for start in starts]
+    gram, cross, power = (np.stack([getattr(data, name) for data in every], axis=1) for name in ("gram", "cross", "power"))
+    for data in map(Statistics, gram, cross, power):
         now = minimise(energy, data, now, None, POSES).state
         path.append(now)
     R = rotation_from_quaternion(np.stack([state.q for state in path]))

@@ -17,8 +17,8 @@ from reconstruction.energy import Energy
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.outliers import LEAST_SIGMA, off_the_common_motion
 from reconstruction.refinement import Refinement, at_rest
-from reconstruction.rest_shape import tilt_axes
 from reconstruction.rigid import RigidMotion, pose_energy
+from reconstruction.sheet import tilt_axes
 from reconstruction.solver import Solution, Solver, minimise
 from reconstruction.state import State, join
 from reconstruction.statistics import Statistics, stack

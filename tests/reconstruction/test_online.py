@@ -338,3 +338,18 @@ def test_a_turning_solid_is_recovered_among_gross_outliers(missing: float) -> No
             estimates += reconstruction.update(np.where(h, w, np.nan), h)
         errors[share] = error(estimates + reconstruction.finish(), truth)
     assert errors[0.15] < 1.3 * errors[0.0] + 0.005, errors
+
+
+def test_a_sheet_before_something_that_moves_by_itself_is_no_solid() -> None:
+    # To an orthographic eye what lies behind, moving by itself, is parallax of a rigid scene.
+    rng = np.random.default_rng(3)
+    front, behind, k = flat(rng, 60), 1.4 * flat(rng, 60), np.arange(60)
+    R = np.stack([turn((8 * np.sin(f / 12 + 0.3), 12 * np.sin(f / 16), 0)) for f in k])
+    W_front, _ = seen(np.broadcast_to(front, (60, 3, 60)), R, PERSPECTIVE)
+    drift = np.stack([10 * np.sin(k / 20), 6 * np.cos(k / 27)], axis=1)[:, :, None]
+    W_behind = behind[:2] + drift + PERSPECTIVE.center_px[:, None]
+    W = np.concatenate([W_front, W_behind], axis=2) + rng.normal(0, 0.1, (60, 2, 120))
+    assert not rest_shape.weigh(W[:20], np.ones((20, 120), bool)).doubt
+    reconstruction, _ = reconstruct(W, settings=Settings())
+    assert reconstruction.rest is not None
+    assert reconstruction.rest.kind == "plane"

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 
 from reconstruction import ReconstructionError, rest_shape
 from reconstruction.camera import Camera
+from reconstruction.factorization import view_turn_degrees
 from reconstruction.rest_shape import apparent_change, first_image, foreshortening_degrees, judging_points, weigh
+from reconstruction.sheet import sheet
 from tests.reconstruction.world import (
     CAMERAS,
     ORTHOGRAPHIC,
@@ -124,6 +126,17 @@ def test_tilt_of_a_turning_sheet_is_recovered_under_perspective(axis: tuple[floa
     assert depths[2] < 1e-9 * depths[0]
 
 
+def test_the_tilt_of_a_sheet_seen_obliquely_shows_in_a_small_turn() -> None:
+    rng = np.random.default_rng(4)
+    sheet = flat(rng, POINTS)
+    R = turns(2 * FRAMES, 4.5) @ turn((0, 50, 0))
+    W, visible = views(sheet, R, PERSPECTIVE)
+    found = rest_shape.plane(W + rng.normal(0, 0.03, W.shape), visible, PERSPECTIVE)
+    assert "tilted" in found.note, found.note
+    assert view_turn_degrees(R) < 10
+    assert shape_error(found.motion.R[0] @ found.motion.shape, R[0] @ sheet) < 0.05
+
+
 @settings(max_examples=8)
 @given(rng=SEEDS, camera=CAMERAS)
 def test_a_still_sheet_faces_the_camera(rng: np.random.Generator, camera: Camera) -> None:
@@ -146,7 +159,7 @@ def test_a_sheet_seen_by_three_points_is_refused() -> None:
 @given(rng=SEEDS, camera=CAMERAS)
 def test_a_sheet_in_a_given_plane_looks_like_the_image(rng: np.random.Generator, camera: Camera) -> None:
     W, _ = views(flat(rng, POINTS), turns(1), camera)
-    motion = rest_shape.sheet(W[0], turn((20, -15, 0)), camera)
+    motion = sheet(W[0], turn((20, -15, 0)), camera)
     np.testing.assert_array_equal(motion.shape[2], 0.0)
     placed = motion.s[0] * motion.R[0] @ motion.shape
     image = (placed[:2] + motion.t[0][:, None]) / (1 + placed[2] / camera.focal_px) + camera.center_px[:, None]
