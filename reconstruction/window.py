@@ -77,9 +77,10 @@ class SlidingWindow:
         self._switch = None
         weights = self._first_weights(W, visible)
         self._data.append(self.model.statistics(W, weights))
-        window = (
-            self._first_state(W, weights > 0.5) if self.state is None else join([self.state, self._leant(self.state[-1:])])
-        )
+        if self.state is None:
+            window = self._first_state(W, weights > TRUSTED)
+        else:
+            window = join([self.state, self._leant(self.state[-1:])])
         if len(window) > self._length:
             window = self._without_oldest(window)
         found = self._adjust(window)
