@@ -34,8 +34,8 @@ class Model:
     refine_rest: bool = True
     """Let later frames improve the rest shape. Not with --energy paper."""
     focal: float | Literal["auto"] | None = None
-    """Focal length in pixels; without it that of the file, or the picture's width; auto: from the first frames, where
-    they hold it."""
+    """Focal length in pixels; auto: from the first frames where they hold it, as a run has it without this option, else the
+    picture's width. Without it, evaluate takes that of the file."""
 
     def __post_init__(self) -> None:
         if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:

@@ -1,5 +1,6 @@
 """What a run begins with: the points of the first frame, and the estimator with the camera they are seen by."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, cast
 
@@ -34,7 +35,7 @@ def prepared(config: Run, first: Frame) -> tuple[Array, Reconstruction]:
     model = config.model
     focal = model.focal if isinstance(model.focal, float) else float(width)
     camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
-    settings = settings_of(model, config.rest_shape)
+    settings = replace(settings_of(model, config.rest_shape), estimate_focal=not isinstance(model.focal, float))
     if config.rest_shape in RECOVERED:
         return points_px, Reconstruction(camera, settings)
     given, inside = rest_of_surface(Path(config.rest_shape), points_px, camera)

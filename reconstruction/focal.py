@@ -21,14 +21,15 @@ from reconstruction.window import SlidingWindow, robust_weights
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
 
-FEWEST = 40  # frames; fewer show too little turn and bend
+FEWEST = 10
 FRAMES = 16  # of them, spread, are enough to compare by
 MODES = 20
-RATIOS = 2.0 ** np.array([-1.0, -0.5, 0.0, 0.5, 1.0])  # looked at first, of the focal length assumed so far
-SIDE = 2.0**0.5  # a focal length so much longer or shorter than the best ...
+STEP = 2.0**0.5  # between the focal lengths looked at first
+SHORTEST, LONGEST = -4, 6  # most steps from the focal length assumed so far
+SIDE = STEP  # a focal length so much longer or shorter than the best ...
 RISE = 1.1  # ... must cost so many times more for the data to hold it
 PRECISION = 0.02  # of the focal length
-EVALUATIONS = 6  # most, between two ratios
+EVALUATIONS = 5  # most, between two steps
 WINDOW = 3  # frames, for the first solution
 
 
@@ -126,26 +127,34 @@ class Trials:
 
 
 def search(cost: Callable[[float], float], start_px: float) -> FocalEstimate:
-    """The focal length of least energy within an octave of `start_px`, if the energy clearly rises on both sides.
+    """The focal length of least energy, downhill from `start_px`, if the energy clearly rises on both sides.
+
+    Of one that is longer than is looked at, only so much is known: what it sees is as good as orthographic.
 
     Args:
         cost: energy of the first frames under a focal length in pixels.
         start_px: the focal length assumed so far, which stays where the data do not hold it.
     """
-    outwards = sorted(RATIOS, key=lambda ratio: abs(np.log(ratio)))
-    costs = [spent for _, spent in sorted((ratio, cost(start_px * ratio)) for ratio in outwards)]
-    best = int(np.argmin(costs))
-    low, high = RATIOS[max(best - 1, 0)], RATIOS[min(best + 1, len(RATIOS) - 1)]
-    found = minimize_scalar(
-        lambda log_ratio: cost(start_px * np.exp(log_ratio)),
-        bounds=(np.log(low), np.log(high)),
-        method="bounded",
-        options={"xatol": PRECISION, "maxiter": EVALUATIONS},
-    )
-    focal_px = float(start_px * np.exp(found.x))
-    rise = min(cost(focal_px / SIDE), cost(focal_px * SIDE)) / max(float(found.fun), 1e-300)
-    if 0 < best < len(RATIOS) - 1 and rise > RISE:
-        return FocalEstimate(focal_px, True, f"focal length {focal_px:.0f} px, from the first frames")
+    costs = {step: cost(start_px * STEP**step) for step in (0, -1, 1)}
+    while True:
+        best = min(costs, key=lambda step: costs[step])
+        beside = [step for step in (best - 1, best + 1) if step not in costs and SHORTEST <= step <= LONGEST]
+        if not beside:
+            break
+        costs |= {step: cost(start_px * STEP**step) for step in beside}
+    if best == LONGEST and costs[0] > RISE * costs[best]:
+        focal_px = start_px * STEP**LONGEST
+        return FocalEstimate(focal_px, True, f"focal length {focal_px:.0f} px or more, from the first frames")
+    if SHORTEST < best < LONGEST:
+        found = minimize_scalar(
+            lambda log_px: cost(np.exp(log_px)),
+            bounds=np.log(start_px) + np.log(STEP) * np.array([best - 1, best + 1]),
+            method="bounded",
+            options={"xatol": PRECISION, "maxiter": EVALUATIONS},
+        )
+        focal_px = float(np.exp(found.x))
+        if min(cost(focal_px / SIDE), cost(focal_px * SIDE)) > RISE * found.fun:
+            return FocalEstimate(focal_px, True, f"focal length {focal_px:.0f} px, from the first frames")
     return FocalEstimate(start_px, False, assumed(start_px, "the first frames do not hold it"))
 
 

@@ -59,6 +59,20 @@ def test_the_least_energy_is_found(truth: float) -> None:
     assert found.focal_px == pytest.approx(truth, rel=0.03)
 
 
-@pytest.mark.parametrize("slope", [-1.0, 0.0, 1.0])
+@pytest.mark.parametrize("truth", [200.0, 2600.0])
+def test_it_is_looked_for_far_from_the_assumed_one(truth: float) -> None:
+    found = search(lambda focal: 1e-4 + np.log(focal / truth) ** 2 * 1e-3, 600.0)
+    assert found.known
+    assert found.focal_px == pytest.approx(truth, rel=0.03)
+
+
+@pytest.mark.parametrize("slope", [0.0, 1.0])
 def test_energy_that_does_not_rise_on_both_sides_says_nothing(slope: float) -> None:
     assert not search(lambda focal: 1.0 + slope * np.log(focal / 600.0) / 4, 600.0).known
+
+
+def test_one_so_long_that_no_perspective_shows_is_known_from_below() -> None:
+    found = search(lambda focal: 1.0 + 1000.0 / focal, 600.0)
+    assert found.known
+    assert found.focal_px == pytest.approx(8 * 600.0)
+    assert "or more" in found.note
