@@ -12,7 +12,9 @@ from reconstruction.camera import Camera
 from reconstruction.constraints import Deformation, build_energy, chosen
 from reconstruction.energy import Energy
 from reconstruction.model import Model, build_model
+from reconstruction.modes import principal_axes
 from reconstruction.rest_shape import RestShape
+from reconstruction.sheet import sheet
 from reconstruction.solver import Solver, minimise
 from reconstruction.state import join
 from reconstruction.statistics import stack
@@ -26,6 +28,7 @@ FRAMES = 16  # of them, spread, are enough to compare by
 MODES = 20
 STEP = 2.0**0.5  # between the focal lengths looked at first
 SHORTEST, LONGEST = -4, 6  # most steps from the focal length assumed so far
+NEARBY = 1.5  # so much longer or shorter, a sheet is tilted alike
 SIDE = STEP  # a focal length so much longer or shorter than the best ...
 RISE = 1.1  # ... must cost so many times more for the data to hold it
 PRECISION = 0.02  # of the focal length
@@ -99,6 +102,7 @@ class Trials:
     ) -> None:
         self._W, self._visible, self._rest, self._camera, self._priors = W, visible, rest, camera, priors
         self._deformation = chosen(deformation, rest, camera)
+        self._axes = {camera.focal_px: principal_axes(rest.motion.shape)}
         model, energy = self._problem(camera.focal_px)
         window = SlidingWindow(model, energy, WINDOW, rest.motion)
         states, weights = [], []
@@ -119,11 +123,20 @@ class Trials:
         return float(found.value.mean())
 
     def _problem(self, focal_px: float) -> tuple[Model, Energy]:
-        camera, rest = replace(self._camera, focal_px=focal_px), self._rest
-        if rest.kind == "plane":
-            rest = rest_shape.plane(self._W, self._visible, camera)  # its tilt depends on the focal length
+        camera = replace(self._camera, focal_px=focal_px)
+        rest = self._tilted(camera) if self._rest.kind == "plane" else self._rest
         model = build_model(rest, camera, min(MODES, self._W.shape[2] - 1))
         return model, build_energy(model, self._deformation, self._priors)
+
+    def _tilted(self, camera: Camera) -> RestShape:
+        """The flat rest shape, whose tilt depends on the focal length: looked for unless that of one nearby will do."""
+        image = rest_shape.first_image(self._W, self._visible)
+        near = [axes for focal_px, axes in self._axes.items() if abs(np.log(camera.focal_px / focal_px)) < np.log(NEARBY)]
+        if near:
+            return replace(self._rest, motion=sheet(image, near[-1], camera).in_first_frame())
+        rest = rest_shape.plane(self._W, self._visible, camera)
+        self._axes[camera.focal_px] = principal_axes(rest.motion.shape)
+        return rest
 
 
 def search(cost: Callable[[float], float], start_px: float) -> FocalEstimate:

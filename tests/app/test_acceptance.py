@@ -86,7 +86,7 @@ def test_more_modes_explain_more(modeshape: Command, shared_data: Path) -> None:
     assert all(b < a + 0.001 for a, b in itertools.pairwise(errors))
 
 
-@pytest.mark.parametrize(("focal", "bound"), [((), 0.055), (("--focal", 528), 0.045)], ids=["width", "true"])
+@pytest.mark.parametrize(("focal", "bound"), [((), 0.055), (("--focal", 528), 0.045)], ids=["found", "true"])
 def test_a_printed_sheet_is_followed(
     modeshape: Command, shared_data: Path, here: Path, focal: tuple[object, ...], bound: float
 ) -> None:
