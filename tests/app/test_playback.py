@@ -11,6 +11,7 @@ import rerun as rr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from app.chunks import complete_bytes
 from app.config import Output, Run
 from app.config_model import Model
 from app.errors import UsageError
@@ -179,7 +180,9 @@ def test_killed_run(tmp_path: Path) -> None:
 def test_file_that_is_cut_off(tmp_path: Path, long_recording: Path) -> None:
     whole = long_recording.read_bytes()
     path = tmp_path / "cut.rrd"
-    path.write_bytes(whole[: int(0.6 * len(whole))])
+    with long_recording.open("rb") as file:
+        between = complete_bytes(file, int(0.6 * len(whole)))
+    path.write_bytes(whole[: between + 40])  # in the middle of a message
     before = path.read_bytes()
     playback, complete = Playback.load(path), Playback.load(long_recording)
     count = len(playback.frames)
