@@ -86,7 +86,8 @@ class SlidingWindow:
         found = self._adjust(window)
         if self._lost is not None:
             found, self._lost = min(found, self._adjust(self._lost), key=lambda one: float(one.value.sum())), None
-        if self._energy.edges is not None and found.value[-1] > max(SURPRISE * self._usual, CALM):
+        surprised = self._energy.edges is not None and found.value[-1] > max(SURPRISE * self._usual, CALM)
+        if surprised:
             found = self._bent_otherwise(found)
         for _ in range(REWEIGHTINGS):
             before, weights = weights, robust_weights(self.model.residuals(W, found.state), visible)
@@ -96,7 +97,10 @@ class SlidingWindow:
             found = self._adjust(found.state)
         newest = float(found.value[-1])
         self.spent += newest
-        self._usual = newest if np.isinf(self._usual) else 0.9 * self._usual + 0.1 * newest
+        if np.isinf(self._usual) or surprised:
+            self._usual = newest  # one surprise is not asked twice
+        else:
+            self._usual = 0.9 * self._usual + 0.1 * newest
         self.state = found.state
         return replace(self.model.estimate(self._frame, W, visible, self.state), switch=self._switch)
 
