@@ -157,7 +157,8 @@ def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> 
     )
     modes = data.gram[:, :, 3:-1, 3:-1]
     kron = (factors.reshape(n, 4, -1).transpose(0, 2, 1) @ modes.reshape(n, 4, -1)).reshape(n, len(rows), len(rows), r, r)
-    normal.diagonal[:, POSE:, POSE:] += kron.transpose(0, 1, 3, 2, 4).reshape(n, k, k)
+    by_rows = normal.diagonal[:, POSE:, POSE:].reshape(n, len(rows), r, len(rows), r)  # a view
+    by_rows += kron.transpose(0, 1, 3, 2, 4)
 
 
 def add_rest(normal: Normal, energy: Energy, state: State) -> None:

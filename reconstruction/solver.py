@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 from scipy.linalg.lapack import dpbsv
@@ -92,20 +93,20 @@ def banded(diagonal: Array, coupling: Array) -> Array:
     n, d, _ = diagonal.shape
     linked = np.flatnonzero(coupling.any(axis=0)) if n > 1 else np.empty(0, np.int64)
     a, b = np.divmod(linked, d)
-    width = d + 1 + int((b - a).max()) if len(linked) else d
+    width = d + 1 + int((b - a).max(initial=0))
     band = np.zeros((n, d * width))
-    inside, place = lower_triangle(d, width)
-    for frame, block in zip(band, diagonal.reshape(n, -1), strict=True):
-        frame[place] = block[inside]
+    # Within a block, (row j, column i >= j) is at j * width + i - j: rows one shorter than the band's; none overlap.
+    frame, number = band.strides
+    block = as_strided(band, (n, d, d), (frame, (width - 1) * number, number))
+    np.multiply(diagonal, upper_triangle(d), out=block)
     band[:-1, d + b - a + a * width] = coupling.reshape(n - 1, d * d)[:, linked]
     return band.reshape(n * d, width)
 
 
 @lru_cache
-def lower_triangle(d: int, width: int) -> tuple[Indices, Indices]:
-    """Where the lower triangle of a (d, d) block is: in the block, and in the band; both flat."""
-    row, column = np.tril_indices(d)
-    return row * d + column, row - column + column * width
+def upper_triangle(d: int) -> Array:
+    """Ones on and above the diagonal (d, d), zeros below."""
+    return np.triu(np.ones((d, d)))
 
 
 def solve_banded(band: Array, right: Array) -> Array:
