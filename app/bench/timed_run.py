@@ -28,8 +28,8 @@ def main() -> None:
     assert isinstance(command, Run)
     clock = Clock()
     words = Session(command, clock).run()
-    clock.stamps.append(time())  # with everything written
-    sys.stdout.write(json.dumps({"stamps": clock.stamps, "peak_mb": peak_mb(), "points": words["points"]}) + "\n")
+    told = {"stamps": clock.stamps, "complete": time(), "peak_mb": peak_mb(), "points": words["points"]}
+    sys.stdout.write(json.dumps(told) + "\n")
 
 
 if __name__ == "__main__":
