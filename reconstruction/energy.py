@@ -150,11 +150,9 @@ def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> 
     mixed = (free.transpose(0, 2, 1)[:, None] @ curved[:, :, :, 3:-1]).reshape(n, POSE, k)
     normal.diagonal[:, :POSE, POSE:] += mixed
     normal.diagonal[:, POSE:, :POSE] += mixed.transpose(0, 2, 1)
-    x, y, z = (free[:, c] for c in range(3))
-    factors = np.stack(
-        [outer(x, x) + outer(y, y), -outer(x, z) - outer(z, x), -outer(y, z) - outer(z, y), outer(z, z)],
-        axis=1,
-    )
+    both = free[:, :, None, :, None] * free[:, None, :, None, :]  # (n, 3, 3, rows, rows)
+    twice = both + both.transpose(0, 2, 1, 3, 4)
+    factors = np.stack([both[:, 0, 0] + both[:, 1, 1], -twice[:, 0, 2], -twice[:, 1, 2], both[:, 2, 2]], axis=1)
     modes = data.gram[:, :, 3:-1, 3:-1]
     kron = (factors.reshape(n, 4, -1).transpose(0, 2, 1) @ modes.reshape(n, 4, -1)).reshape(n, len(rows), len(rows), r, r)
     by_rows = normal.diagonal[:, POSE:, POSE:].reshape(n, len(rows), r, len(rows), r)  # a view
@@ -221,7 +219,8 @@ def add_smoothness(normal: Normal, energy: Energy, state: State, before: State |
     if n == 0:
         return
     nearer = np.where((earlier.q * later.q).sum(axis=1) < 0, -1.0, 1.0)[:, None, None]
-    J_earlier, J_later = -nearer * quaternion_tangent(earlier.q), quaternion_tangent(later.q)
+    tangents = quaternion_tangent(chain.q)
+    J_earlier, J_later = -nearer * tangents[:-1], tangents[1:]
     delta = quaternion_difference(earlier.q, later.q)[:, :, None]
     weights = np.full(d, energy.smoothness)
     weights[3:5], weights[5] = energy.translation, energy.scale
@@ -244,8 +243,3 @@ def add_smoothness(normal: Normal, energy: Energy, state: State, before: State |
 def diagonals(blocks: Array) -> Array:
     """The diagonals (n, d) of blocks (n, d, d), to be changed in place."""
     return np.asarray(np.einsum("nii->ni", blocks))
-
-
-def outer(a: Array, b: Array) -> Array:
-    """Outer products (n, i, j) of vectors (n, i) and (n, j)."""
-    return np.asarray(a[:, :, None] * b[:, None, :])

@@ -15,7 +15,8 @@ Flags = NDArray[np.bool_]
 WINDOW_PX = 15
 # The guides find the motion, the others only refine it. With all points on all levels, 21 % of kinect_paper's
 # fail between frames 60 and 61 (its texture repeats), in 20 ms; led by guides, none, in 8 ms (one core). Guides are
-# followed in the half picture, which is as good a guide at a quarter of the cost.
+# followed in the half picture, which is as good a guide at a quarter of the cost. Dense flow (DIS, ultrafast) as the guide
+# brings 97.7 % of 1,475 points back in 9.4 ms, these guides 98.1 % in 8.7 ms.
 GUIDES = 150
 GUIDE_WINDOW_PX = 11  # of the half picture
 GUIDE_LEVELS = 3  # halvings of a half picture 320 px wide
