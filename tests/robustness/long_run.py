@@ -33,11 +33,17 @@ class Watcher(Progress):
 
     def advance(self, phase: str, error_px: float | None = None) -> None:
         super().advance(phase, error_px)
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-        self.resident_mb.append(pages * 4096 / 2**20)
+        self.resident_mb.append(resident_mb())
         self.at_s.append(process_time())
         if len(self.at_s) % 500 == 0:
             sys.stderr.write(f"frame {len(self.at_s)}: {self.resident_mb[-1]:.1f} MB, {phase}\n")
+
+
+def resident_mb() -> float:
+    """Resident memory of this process and of the one that writes the recording."""
+    children = [pid for task in Path("/proc/self/task").iterdir() for pid in (task / "children").read_text().split()]
+    pages = [int(Path(f"/proc/{pid}/statm").read_text().split()[1]) for pid in ("self", *children)]
+    return sum(pages) * 4096 / 2**20
 
 
 def twice(video: Path, path: Path) -> Path:
