@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
 
 FEWEST = 10
-FRAMES = 16  # of them, spread, are enough to compare by
+FRAMES = 12  # of them, spread, are enough to compare by
 MODES = 20
 STEP = 2.0**0.5  # between the focal lengths looked at first
 SHORTEST, LONGEST = -4, 6  # most steps from the focal length assumed so far
