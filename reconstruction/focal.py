@@ -23,7 +23,7 @@ from reconstruction.window import SlidingWindow, robust_weights
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
 
-FEWEST = 10
+FEWEST = 10  # frames; fewer show too little turn
 FRAMES = 12  # of them, spread, are enough to compare by
 MODES = 20
 STEP = 2.0**0.5  # between the focal lengths looked at first
@@ -98,7 +98,7 @@ class Trials:
         camera: Camera,
         rest: RestShape,
         deformation: Deformation,
-        priors: Mapping[str, float] | None = None,
+        priors: Mapping[str, float] | None,
     ) -> None:
         self._W, self._visible, self._rest, self._camera, self._priors = W, visible, rest, camera, priors
         self._deformation = chosen(deformation, rest, camera)
@@ -130,9 +130,9 @@ class Trials:
 
     def _tilted(self, camera: Camera) -> RestShape:
         """The flat rest shape, whose tilt depends on the focal length: looked for unless that of one nearby will do."""
-        image = rest_shape.first_image(self._W, self._visible)
         near = [axes for focal_px, axes in self._axes.items() if abs(np.log(camera.focal_px / focal_px)) < np.log(NEARBY)]
         if near:
+            image = rest_shape.first_image(self._W, self._visible)
             return replace(self._rest, motion=sheet(image, near[-1], camera).in_first_frame())
         rest = rest_shape.plane(self._W, self._visible, camera)
         self._axes[camera.focal_px] = principal_axes(rest.motion.shape)
