@@ -16,14 +16,14 @@ class Model:
 
     bootstrap_frames: Literal["auto"] | int = "auto"
     """Frames the rest shape comes from; auto decides from the evidence."""
-    metric: Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"] = "euclidean"
+    metric: Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"] = "chi-squared"
     """Distance between points that the modes come from: straight, along the mesh's edges, in units of the extent along
     each axis, chi-squared of the coordinates, or Jensen-Shannon of the nearness to landmarks."""
     modes: int = 20
     """Number of modes r."""
     deformation: Literal["auto", "bending", "stretching", "general", "inextensible"] = "auto"
-    """How the surface may deform; auto: general for a solid rest shape, inextensible for a flat one, bending for a flat one
-    seen by an orthographic camera."""
+    """How the surface may deform: out of its plane, drawing in as a sheet does that keeps its lengths; in its plane; freely;
+    freely, but nearly keeping its lengths. Auto: general for a solid rest shape, inextensible for a flat one."""
     window: int = 5
     """Frames adjusted together."""
     energy: Literal["anchored", "paper"] = "anchored"

@@ -1,12 +1,13 @@
 """What is known of how a surface deforms (paper §3.4): rows of Λ that stay zero, and how hard the others are held."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from reconstruction import priors
-from reconstruction.camera import Camera
+from reconstruction.edges import Bending
 from reconstruction.energy import Energy
 from reconstruction.model import Model
 from reconstruction.rest_shape import RestShape
@@ -20,17 +21,11 @@ ROWS: dict[str, tuple[int, ...]] = {
 }
 
 
-def chosen(deformation: Deformation, rest: RestShape, camera: Camera) -> Deformation:
-    """The constraint itself for `auto`: a solid may do anything, a sheet keeps its lengths.
-
-    An orthographic camera sees a bend and its mirror image alike: there lengths would be kept by either, and now and then
-    the wrong one is taken for good; bending alone stays on its side.
-    """
+def chosen(deformation: Deformation, rest: RestShape) -> Deformation:
+    """The constraint itself for `auto`: a solid may do anything, a sheet keeps its lengths."""
     if deformation != "auto":
         return deformation
-    if not rest.flat:
-        return "general"
-    return "inextensible" if camera.perspective else "bending"
+    return "inextensible" if rest.flat else "general"
 
 
 def build_energy(
@@ -55,4 +50,16 @@ def build_energy(
         free_scale=not paper,
         tied=not paper,
         edges=model.coarse_edges() if weights["inextensibility"] else None,
+        bending=Bending(model.coarse_edges(), stiffness) if deformation == "bending" and not paper else None,
     )
+
+
+def build_guide(model: Model, deformation: Deformation, *, paper: bool = False) -> Energy | None:
+    """What leads to the branch that an energy of kept lengths is to start from, if it needs that.
+
+    An orthographic camera sees a bend and its mirror image alike and lengths are kept by either, so now and then the wrong
+    one would be taken for good. Bending with rows α and β at rest, as the paper has it, stays on its side.
+    """
+    if paper or model.camera.perspective or deformation not in ("bending", "inextensible"):
+        return None
+    return replace(build_energy(model, "bending"), bending=None)

@@ -12,6 +12,7 @@ from reconstruction import ReconstructionError
 from reconstruction.mesh import farthest_points
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 Metric = Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"]
 
 THINNEST = 0.03  # variance added to each principal axis, as a share of their mean: a flat sheet has none across
@@ -19,31 +20,31 @@ AWAY_FROM_ZERO = 0.05  # smallest coordinate of the chi-squared distance, in RMS
 LANDMARKS, BLUR = 64, 0.5  # points that a point is described by, and how far it spreads among them, in RMS radii
 
 
-def dissimilarity(metric: Metric, rest: Array, edges: NDArray[np.int64]) -> Array:
-    """D (p, p) of the rest shape (3, p) with mesh edges (n, 2).
+def dissimilarity(metric: Metric, rest: Array, edges: Indices, to: Indices | None = None) -> Array:
+    """D (p, p) of the rest shape (3, p) with mesh edges (n, 2), or its columns (p, m) of the points `to` (m,).
 
     Raises:
         ReconstructionError: manhattan, and the mesh falls into pieces.
     """
     match metric:
         case "manhattan":
-            return manhattan(rest, edges)
+            return manhattan(rest, edges, to)
         case "mahalanobis":
-            return mahalanobis(rest)
+            return mahalanobis(rest, to)
         case "chi-squared":
-            return chi_squared(rest)
+            return chi_squared(rest, to)
         case "jensen-shannon":
-            return jensen_shannon(rest)
+            return jensen_shannon(rest, to)
         case _:
-            return euclidean(rest)
+            return euclidean(rest, to)
 
 
-def euclidean(rest: Array) -> Array:
-    """D_E (p, p): straight distances between the points of the rest shape (3, p) (Eq. 1)."""
-    return np.asarray(squareform(pdist(rest.T)))
+def euclidean(rest: Array, to: Indices | None = None) -> Array:
+    """D_E (p, p), or its columns `to`: straight distances between the points of the rest shape (3, p) (Eq. 1)."""
+    return between(rest.T, to)
 
 
-def manhattan(rest: Array, edges: NDArray[np.int64], to: NDArray[np.int64] | None = None) -> Array:
+def manhattan(rest: Array, edges: Indices, to: Indices | None = None) -> Array:
     """D_M (p, p), or its columns `to`: shortest paths along the mesh edges (n, 2) of the rest shape (3, p), by Dijkstra.
 
     Raises:
@@ -61,35 +62,47 @@ def manhattan(rest: Array, edges: NDArray[np.int64], to: NDArray[np.int64] | Non
     return D if to is None else D.T
 
 
-def mahalanobis(rest: Array) -> Array:
-    """D (p, p): straight distances where each principal axis is measured by the rest shape's (3, p) spread along it."""
+def mahalanobis(rest: Array, to: Indices | None = None) -> Array:
+    """D (p, p), or its columns `to`: straight distances in units of the shape's (3, p) spread along each axis."""
     covariance = np.cov(rest)
     covariance += THINNEST * np.trace(covariance) / 3 * np.eye(3)
-    return np.asarray(squareform(pdist(rest.T, "mahalanobis", VI=np.linalg.inv(covariance))))
+    return between(rest.T @ np.linalg.cholesky(np.linalg.inv(covariance)), to)
 
 
-def chi_squared(rest: Array) -> Array:
-    """D (p, p): √(½ Σ_k (a_k − b_k)²/(a_k + b_k)) of the coordinates along the principal axes.
+def chi_squared(rest: Array, to: Indices | None = None) -> Array:
+    """D (p, p), or its columns `to`: √(½ Σ_k (a_k − b_k)²/(a_k + b_k)) of the coordinates along the principal axes.
 
-    Each coordinate is counted once from its least and once from its greatest value, so that no axis has a direction.
+    Each coordinate is counted once from its least and once from its greatest value, so that no axis has a direction. That
+    stretches a surface towards its edges, and the modes of a strip come near Chebyshev's polynomials where straight
+    distances give cosines, which are level at the edges: a free edge bends, and few modes follow it.
     """
     centred = rest - rest.mean(axis=1, keepdims=True)
     along = np.linalg.svd(centred, full_matrices=False)[0].T @ centred
     from_ends = np.concatenate([along - along.min(axis=1, keepdims=True), along.max(axis=1, keepdims=True) - along])
     from_ends += AWAY_FROM_ZERO * rms_radius(rest)
-    squares = sum((a[:, None] - a) ** 2 / (a[:, None] + a) for a in from_ends)
+    squares = np.zeros((rest.shape[1], rest.shape[1] if to is None else len(to)))
+    for a in from_ends:
+        b = a if to is None else a[to]
+        share = a[:, None] - b
+        share *= share
+        share /= a[:, None] + b
+        squares += share
     return np.asarray(np.sqrt(0.5 * squares))
 
 
-def jensen_shannon(rest: Array) -> Array:
-    """D (p, p): root of the Jensen-Shannon divergence between the points' distributions over well-spread landmarks.
+def jensen_shannon(rest: Array, to: Indices | None = None) -> Array:
+    """D (p, p), or its columns `to`: root of the Jensen-Shannon divergence of distributions over well-spread landmarks.
 
     A point belongs to each landmark with a weight that falls like a Gaussian with their distance.
     """
     landmarks = rest[:, farthest_points(rest.T, LANDMARKS)]
     weights = np.exp(-0.5 * (cdist(rest.T, landmarks.T) / (BLUR * rms_radius(rest))) ** 2)
-    shares = weights / weights.sum(axis=1, keepdims=True)
-    return np.asarray(squareform(pdist(shares, "jensenshannon")))
+    return between(weights / weights.sum(axis=1, keepdims=True), to, "jensenshannon")
+
+
+def between(points: Array, to: Indices | None, metric: Literal["euclidean", "jensenshannon"] = "euclidean") -> Array:
+    """Distances (p, p) between points (p, d), or (p, m) to those of them with the indices `to` (m,)."""
+    return np.asarray(squareform(pdist(points, metric)) if to is None else cdist(points, points[to], metric))
 
 
 def rms_radius(rest: Array) -> float:

@@ -11,29 +11,16 @@ from numpy.typing import NDArray
 
 from reconstruction import statistics
 from reconstruction.camera import left_matrix
+from reconstruction.edges import Bending, CoarseEdges
 from reconstruction.state import POSE, State, join
 from reconstruction.statistics import Statistics
 
 Array = NDArray[np.float64]
 
+ALL_ROWS = (0, 1, 2)
 HAT = np.zeros((3, 3, 3))  # HAT[k] = [e_k]×
 for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     HAT[i, k, j], HAT[i, j, k] = 1.0, -1.0
-
-
-@dataclass(frozen=True)
-class CoarseEdges:
-    """Edges of a coarse mesh whose lengths the surface keeps (method: coarse since smooth modes cannot stretch between).
-
-    Attributes:
-        rest: (3, e) end minus start in the rest shape S̄'.
-        modes: (r, e) the same of Υ'.
-        length: (e,) rest lengths.
-    """
-
-    rest: Array
-    modes: Array
-    length: Array
 
 
 @dataclass(frozen=True)
@@ -52,6 +39,7 @@ class Energy:
         free_scale: whether s is estimated; the paper's energy keeps s = 1.
         tied: whether the oldest frame is tied to the frame that has left the window; without, the window floats.
         edges: coarse edges of the inextensibility term.
+        bending: rows of Λ that are not free follow from row τ, for a sheet that keeps its lengths; else they stay at rest.
     """
 
     rotation: float = 3e-4
@@ -61,21 +49,28 @@ class Energy:
     rest: float | Array = 1e-2
     centre: float | Array = 0.0
     inextensibility: float = 0.0
-    rows: tuple[int, ...] = (0, 1, 2)
+    rows: tuple[int, ...] = ALL_ROWS
     free_scale: bool = True
     tied: bool = True
     edges: CoarseEdges | None = None
+    bending: Bending | None = None
 
     def about(self, centre: Array) -> "Energy":
         """The same energy about a rest shape refined to Λ̄' (3, r): what it pulls to, and which lengths edges keep."""
-        edges = self.edges
-        if edges is not None:
-            edges = replace(edges, length=np.linalg.norm(edges.rest + centre @ edges.modes, axis=0))
-        return replace(self, centre=centre, edges=edges)
+        edges = self.edges and self.edges.about(centre)
+        return replace(self, centre=centre, edges=edges, bending=self.bending and self.bending.about(centre))
+
+    def completed(self, state: State) -> State:
+        """The state with the rows of Λ' that are not free as they must be."""
+        if self.rows == ALL_ROWS:
+            return state
+        Lambda = np.broadcast_to(self.centre, state.Lambda.shape).copy()
+        Lambda[:, self.rows] = state.Lambda[:, self.rows]
+        return replace(state, Lambda=Lambda if self.bending is None else self.bending.completed(Lambda))
 
     def rigid(self) -> "Energy":
         """The same energy with nothing deforming: pose only."""
-        return replace(self, rows=(), edges=None, inextensibility=0.0)
+        return replace(self, rows=(), edges=None, inextensibility=0.0, bending=None)
 
 
 @dataclass
@@ -97,9 +92,10 @@ class Normal:
 
 def evaluate(energy: Energy, data: Statistics, state: State, before: State | None) -> Array:
     """Energy (n,) per frame; `before` is the frame that has left the window (n = 1)."""
-    value = statistics.value(data, state.matrices()) + (energy.rest * (state.Lambda - energy.centre) ** 2).sum(axis=(1, 2))
+    free = (state.Lambda - energy.centre)[:, energy.rows]
+    value = statistics.value(data, state.matrices()) + (energy.rest * free**2).sum(axis=(1, 2))
     if energy.edges is not None:
-        strain = edge_strain(energy.edges, edge_vectors(energy.edges, state))
+        strain = energy.edges.strain(energy.edges.vectors(state.Lambda))
         value += energy.inextensibility * (strain**2).mean(axis=1)
     value[1:] += smoothness(energy, state[:-1], state[1:])
     if energy.tied and before is not None:
@@ -113,7 +109,10 @@ def linearise(energy: Energy, data: Statistics, state: State, before: State | No
     d = POSE + len(energy.rows) * r
     value = evaluate(energy, data, state, before) if value is None else value
     normal = Normal(value, np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((n - 1, d, d)))
-    add_data(normal, energy, data, state)
+    if energy.bending is None:
+        add_data(normal, energy.rows, data, state)
+    else:
+        add_data_of_bending(normal, energy.bending, data, state)
     add_rest(normal, energy, state)
     if energy.edges is not None:
         add_inextensibility(normal, energy, energy.edges, state)
@@ -126,10 +125,10 @@ def linearise(energy: Energy, data: Statistics, state: State, before: State | No
     return normal
 
 
-def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> None:
+def add_data(normal: Normal, free_rows: tuple[int, ...], data: Statistics, state: State) -> None:
     """Reprojection, quadratic in M: pose by the chain rule, Λ as a Kronecker product of AᵀA and the Υ part of the sums."""
     n, r = len(state), state.Lambda.shape[2]
-    rows = list(energy.rows)
+    rows = list(free_rows)
     M = state.matrices()
     A = M[:, :, :3]
     pose = np.zeros((n, POSE, 3, 4 + r))  # dM/d(θ, t, log s)
@@ -159,6 +158,20 @@ def add_data(normal: Normal, energy: Energy, data: Statistics, state: State) -> 
     by_rows += kron.transpose(0, 1, 3, 2, 4)
 
 
+def add_data_of_bending(normal: Normal, bending: Bending, data: Statistics, state: State) -> None:
+    """Reprojection where rows α and β follow from row τ: the same by the chain rule through them."""
+    n, r = len(state), state.Lambda.shape[2]
+    d = POSE + 3 * r
+    every = Normal(normal.value, np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((0, d, d)))
+    add_data(every, ALL_ROWS, data, state)
+    J = np.zeros((n, d, POSE + r))
+    J[:, :POSE, :POSE] = np.eye(POSE)
+    J[:, POSE:, POSE:] = bending.slope(state.Lambda)
+    Jt = J.transpose(0, 2, 1)
+    normal.gradient += (Jt @ every.gradient[:, :, None])[:, :, 0]
+    normal.diagonal += Jt @ every.diagonal @ J
+
+
 def add_rest(normal: Normal, energy: Energy, state: State) -> None:
     """λ_0‖Λ' − Λ̄'‖²: the pull to the rest shape."""
     free = (state.Lambda - energy.centre)[:, energy.rows, :]
@@ -167,21 +180,11 @@ def add_rest(normal: Normal, energy: Energy, state: State) -> None:
     diagonals(normal.diagonal)[:, POSE:] += weights
 
 
-def edge_vectors(edges: CoarseEdges, state: State) -> Array:
-    """Edges (n, 3, e) of the deformed shapes."""
-    return np.asarray(edges.rest + state.Lambda @ edges.modes)
-
-
-def edge_strain(edges: CoarseEdges, vectors: Array) -> Array:
-    """ρ_e = (‖d_e‖² − l_e²)/(2 l_e) (n, e): the change of length to first order, without a square root."""
-    return np.asarray(((vectors**2).sum(axis=1) - edges.length**2) / (2 * edges.length))
-
-
 def add_inextensibility(normal: Normal, energy: Energy, edges: CoarseEdges, state: State) -> None:
     """κ mean_e ρ_e²: edges of the coarse mesh keep their rest length."""
     n, count = len(state), len(edges.length)
-    vectors = edge_vectors(edges, state)
-    strain = edge_strain(edges, vectors)
+    vectors = edges.vectors(state.Lambda)
+    strain = edges.strain(vectors)
     direction = (vectors / edges.length)[:, energy.rows, None, :]
     J = (direction * edges.modes).reshape(n, -1, count)
     weight = energy.inextensibility / count
@@ -195,7 +198,7 @@ def smoothness(energy: Energy, earlier: State, later: State) -> Array:
         energy.rotation * (quaternion_difference(earlier.q, later.q) ** 2).sum(axis=1)
         + energy.translation * ((later.t - earlier.t) ** 2).sum(axis=1)
         + energy.scale * (later.log_s - earlier.log_s) ** 2
-        + energy.smoothness * ((later.Lambda - earlier.Lambda) ** 2).sum(axis=(1, 2))
+        + energy.smoothness * ((later.Lambda - earlier.Lambda)[:, energy.rows] ** 2).sum(axis=(1, 2))
     )
 
 

@@ -101,7 +101,7 @@ class Trials:
         priors: Mapping[str, float] | None,
     ) -> None:
         self._W, self._visible, self._rest, self._camera, self._priors = W, visible, rest, camera, priors
-        self._deformation = chosen(deformation, rest, camera)
+        self._deformation = chosen(deformation, rest)
         self._axes = {camera.focal_px: principal_axes(rest.motion.shape)}
         model, energy = self._problem(camera.focal_px)
         window = SlidingWindow(model, energy, WINDOW, rest.motion)

@@ -8,41 +8,32 @@ brought to an orthonormal basis of its m columns, its eigenpairs are those of an
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh, pinvh
-from scipy.spatial.distance import cdist
 
-from reconstruction import distances
+from reconstruction.distances import Metric, dissimilarity
 from reconstruction.mesh import farthest_points
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-METRICS = ("euclidean", "manhattan")
 LANDMARKS = 300
 PER_MODE = 5  # at least so many landmarks for each mode
 # D's eigenvalues below this share of the largest are dropped: path lengths have small ones of the wrong sign.
 NEGLIGIBLE = 1e-4
 
 
-def leading_eigenpairs(rest: Array, edges: Indices, count: int, metric: str) -> tuple[Array, Array]:
+def leading_eigenpairs(rest: Array, edges: Indices, count: int, metric: Metric) -> tuple[Array, Array]:
     """The `count` largest eigenvalues, descending, and eigenvectors (p, count) of −½CDC of the rest shape (3, p).
 
     Raises:
         ReconstructionError: the mesh with edges (n, 2) falls into pieces, with the manhattan metric.
     """
     chosen = landmarks(rest, count)
-    return eigenpairs_of(distances_to(chosen, rest, edges, metric), chosen, count)
+    return eigenpairs_of(dissimilarity(metric, rest, edges, chosen), chosen, count)
 
 
 def landmarks(rest: Array, modes: int) -> Indices:
     """Well-spread points (m,) of the rest shape (3, p), enough for so many modes."""
     return farthest_points(rest.T, max(LANDMARKS, PER_MODE * modes))
-
-
-def distances_to(chosen: Indices, rest: Array, edges: Indices, metric: str) -> Array:
-    """D[:, L] (p, m): distances of the points of the rest shape (3, p) to the landmarks (m,)."""
-    if metric == "euclidean":
-        return np.asarray(cdist(rest.T, rest[:, chosen].T))
-    return distances.manhattan(rest, edges, chosen)
 
 
 def eigenpairs_of(to_landmarks: Array, chosen: Indices, count: int) -> tuple[Array, Array]:

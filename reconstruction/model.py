@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from reconstruction.ambiguity import Switch
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
-from reconstruction.energy import CoarseEdges
+from reconstruction.edges import CoarseEdges
 from reconstruction.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges
 from reconstruction.modes import Metric, ModalBasis, modal_basis, principal_axes
 from reconstruction.rest_shape import RestShape

@@ -52,7 +52,7 @@ def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean
     if not 1 <= modes < p:
         raise ReconstructionError(f"--modes {modes} does not fit {p} points: choose 1 to {p - 1}")
     rest = rest - rest.mean(axis=1, keepdims=True)
-    if p > EXACT_POINTS and metric in landmarks.METRICS:
+    if p > EXACT_POINTS:
         eigenvalues, vectors = landmarks.leading_eigenpairs(rest, mesh.edges, modes, metric)
         Upsilon = with_fixed_signs(vectors).T
     else:

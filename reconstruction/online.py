@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError, focal, priors, rest_shape
 from reconstruction.camera import Camera
-from reconstruction.constraints import Deformation, build_energy, chosen
+from reconstruction.constraints import Deformation, build_energy, build_guide, chosen
 from reconstruction.factorization import view_turn_degrees
 from reconstruction.mesh import Mesh
 from reconstruction.model import Model, ShapeEstimate, build_model
@@ -54,7 +54,7 @@ class Settings:
     rest_shape: Literal["auto", "rigid", "plane"] = "auto"
     bootstrap_frames: int | None = None
     modes: int = 20
-    metric: Metric = "euclidean"
+    metric: Metric = "chi-squared"
     deformation: Deformation = "auto"
     window: int = 5
     energy: Literal["anchored", "paper"] = "anchored"
@@ -196,11 +196,12 @@ class Reconstruction:
 
     def _start(self, rest: RestShape) -> list[ShapeEstimate]:
         self.rest, self.bootstrap_frames = rest, len(self._waiting)
-        self.deformation = chosen(self.deformation, rest, self.camera)
+        self.deformation = chosen(self.deformation, rest)
         model = build_model(rest, self.camera, self.settings.modes, self.settings.metric, self._mesh)
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
         refine = self.settings.refine_rest and not paper
-        self.window = SlidingWindow(model, energy, self.settings.window, rest.motion, refine=refine)
+        guide = build_guide(model, self.deformation, paper=paper)
+        self.window = SlidingWindow(model, energy, self.settings.window, rest.motion, refine=refine, guide=guide)
         waiting, self._waiting = self._waiting, []
         return [self.window.advance(W, visible) for W, visible in waiting]

@@ -40,12 +40,12 @@ PRIORS: dict[str, Prior] = {
         "λ_0 Σ_k ω_k ‖Λ'_k − Λ̄'_k‖², ω_k ∝ eigenvalue_k^(−½)",
         "Pulls to the rest shape, weak modes harder. Without it, modes 1 and 2 do what tilt and scale should. More where "
         "points are few or noisy, less where the surface deforms far.",
-        {"bending": 1e-2, "inextensible": 1e-3, OTHERWISE: 2e-2},
+        {"bending": 1e-2, "inextensible": 3e-4, OTHERWISE: 2e-2},
     ),
     "smoothness": Prior(
         "λ_γ ‖ΔΛ'‖²",
         "The deformation changes slowly. More for noisy or missing points and high frame rates, less for fast motion.",
-        {"bending": 1e-3, "inextensible": 1e-3, OTHERWISE: 3e-2},
+        {"bending": 1e-3, "inextensible": 3e-4, OTHERWISE: 1e-1},
     ),
     "rotation": Prior(
         "λ_q ‖Δq‖²",
@@ -67,7 +67,7 @@ PRIORS: dict[str, Prior] = {
         "κ mean_e ρ_e², ρ_e = (‖d_e‖² − l_e²) / (2 l_e)",
         "The edges d_e of a coarse mesh keep their lengths l_e: paper, cloth. Less for what stretches somewhat, or for a "
         "rest shape that is only roughly known; none for skin and rubber.",
-        {"inextensible": 3.0, OTHERWISE: 0.0},
+        {"inextensible": 1.0, OTHERWISE: 0.0},
     ),
 }
 # The energy of the paper as printed: nothing pulls to rest.

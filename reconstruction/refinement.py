@@ -8,16 +8,15 @@ deformation add up to one normal system for a shift that they all share; no poin
 import numpy as np
 from numpy.typing import NDArray
 
-from reconstruction.energy import Energy, Normal, add_data
+from reconstruction.energy import ALL_ROWS, Normal, add_data
 from reconstruction.state import POSE, State
 from reconstruction.statistics import Statistics
 
 Array = NDArray[np.float64]
 
-PULL = 2.0  # towards the first rest shape; a frame in which all points are seen weighs about 1
+PULL = 0.7  # towards the first rest shape; a frame in which all points are seen weighs about 1
 KEPT = 0.98  # of what is known, frame by frame: some 50 frames count
 FEWEST = 5  # frames; fewer turn too little to tell rest from pose
-ALL_ROWS = Energy(rows=(0, 1, 2))
 
 
 class Refinement:
@@ -47,10 +46,3 @@ class Refinement:
         if self._frames >= FEWEST:
             pulled = self._hessian + PULL * np.eye(self.rest.size)
             self.rest = np.asarray(np.linalg.solve(pulled, self._right)).reshape(self.rest.shape)
-
-
-def at_rest(state: State, rest: Array, rows: tuple[int, ...]) -> State:
-    """The state with all but the given rows of Λ' as they are at rest (3, r)."""
-    Lambda = np.broadcast_to(rest, state.Lambda.shape).copy()
-    Lambda[:, rows, :] = state.Lambda[:, rows, :]
-    return State(state.q, state.t, state.log_s, Lambda)

@@ -46,11 +46,12 @@ class Solution:
 
 def minimise(energy: Energy, data: Statistics, start: State, before: State | None, solver: Solver) -> Solution:
     """Minimise the energy of a window from `start`; `before` is the frame that has left it."""
-    state, damping, steps = start, solver.damping, 0
+    state, damping, steps = energy.completed(start), solver.damping, 0
+    before = before and energy.completed(before)
     normal = linearise(energy, data, state, before)
     while steps < solver.iterations:
         steps += 1
-        trial = state.moved(damped_step(normal, damping), energy.rows)
+        trial = energy.completed(state.moved(damped_step(normal, damping), energy.rows))
         value = evaluate(energy, data, trial, before)
         gain = normal.value.sum() - value.sum()
         if not gain > 0:  # also when not finite

@@ -16,7 +16,7 @@ from reconstruction.camera import (
 from reconstruction.energy import Energy
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.outliers import LEAST_SIGMA, off_the_common_motion
-from reconstruction.refinement import Refinement, at_rest
+from reconstruction.refinement import Refinement
 from reconstruction.rigid import RigidMotion, pose_energy
 from reconstruction.sheet import tilt_axes
 from reconstruction.solver import Solution, Solver, minimise
@@ -51,17 +51,28 @@ class SlidingWindow:
         length: frames 𝒲 in the window.
         motion: how the rest shape is seen in the first frame.
         refine: whether frames that leave the window refine the rest shape.
+        guide: an energy that stands in for it until the shapes are to be shown, where it would lose the branch it is on.
 
     Attributes:
         state: the window's frames; None before the first.
         spent: energy of all frames so far, each when it was the newest.
     """
 
-    def __init__(self, model: Model, energy: Energy, length: int, motion: RigidMotion, *, refine: bool = False) -> None:
+    def __init__(
+        self,
+        model: Model,
+        energy: Energy,
+        length: int,
+        motion: RigidMotion,
+        *,
+        refine: bool = False,
+        guide: Energy | None = None,
+    ) -> None:
         self.model = model
         self.state: State | None = None
         self.spent = 0.0
-        self._energy, self._length, self._motion = energy, length, motion
+        self._energy, self._length, self._motion = guide or energy, length, motion
+        self._shown = energy if guide else None
         self._before: State | None = None  # the frame that has left the window
         self._lost: State | None = None  # the last frame before everything started anew
         self._data: list[Statistics] = []
@@ -102,7 +113,7 @@ class SlidingWindow:
         else:
             self._usual = 0.9 * self._usual + 0.1 * newest
         self.state = found.state
-        return replace(self.model.estimate(self._frame, W, visible, self.state), switch=self._switch)
+        return replace(self.model.estimate(self._frame, W, visible, self._settled()), switch=self._switch)
 
     def restart(self) -> None:
         """The surface was lost: the next frame is tied to nothing, and starts from the rest or from the last shape."""
@@ -123,12 +134,18 @@ class SlidingWindow:
         if self._refine:
             self._rest.take(data, self._before)
             self._energy = self._energy.about(self._rest.rest)
-            self._before = at_rest(self._before, self._rest.rest, self._energy.rows)
-            window = at_rest(window, self._rest.rest, self._energy.rows)
+            self._shown = self._shown and self._shown.about(self._rest.rest)
         return window[1:]
 
     def _adjust(self, start: State) -> Solution:
         return minimise(self._energy, stack(self._data), start, self._before, Solver())
+
+    def _settled(self) -> State:
+        """The window as it is shown: where a guide led to, by the energy that it stands in for."""
+        assert self.state is not None
+        if self._shown is None:
+            return self.state
+        return minimise(self._shown, stack(self._data), self.state, self._before, Solver()).state
 
     def _first_weights(self, W: Array, visible: Visibility) -> Array:
         """Visibility (p,) without the points whose motion since the last shape is out of all proportion."""

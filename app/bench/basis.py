@@ -64,7 +64,7 @@ def own_times(points: int, metric: Metric) -> tuple[float, float]:
     with threadpool_limits(1):
         if points > EXACT_POINTS:
             chosen = landmarks.landmarks(rest, MODES)
-            to, build_s = clocked(lambda: landmarks.distances_to(chosen, rest, mesh.edges, metric))
+            to, build_s = clocked(lambda: distances.dissimilarity(metric, rest, mesh.edges, chosen))
             return build_s, clocked(lambda: landmarks.eigenpairs_of(to, chosen, MODES))[1]
         D, build_s = clocked(lambda: doubly_centred(distances.dissimilarity(metric, rest, mesh.edges)))
         return build_s, clocked(lambda: leading_eigenpairs(D, MODES))[1]

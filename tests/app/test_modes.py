@@ -81,7 +81,7 @@ def test_tracks_show_the_modes_of_their_rest_shape(tmp_path: Path, tracks: Path)
     for kind in ("first-truth", "rigid"):
         command = Modes(tracks, out=tmp_path / f"{kind}.png", rest_shape=kind, model=Model(modes=6))
         found[kind] = modes(command, Progress())["eigenvalues"]
-    expected = modal_basis(truth[0], triangulate(truth[0, :2].T), 6).eigenvalues
+    expected = modal_basis(truth[0], triangulate(truth[0, :2].T), 6, "chi-squared").eigenvalues
     assert found["first-truth"] == pytest.approx(expected)
     assert found["rigid"] == pytest.approx(expected, rel=0.02)
 

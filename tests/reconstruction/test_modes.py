@@ -1,5 +1,7 @@
 """The modes of a rest shape: centring, eigenvectors, principal axes, and the linear subspace."""
 
+from typing import get_args
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -18,7 +20,7 @@ from reconstruction.modes import (
 )
 from tests.reconstruction.world import SEEDS, flat, relief
 
-METRICS: tuple[Metric, ...] = ("euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon")
+METRICS: tuple[Metric, ...] = get_args(Metric)
 
 
 def basis_of(rest: np.ndarray, modes: int, metric: Metric = "euclidean") -> ModalBasis:

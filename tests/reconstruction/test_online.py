@@ -1,6 +1,7 @@
 """The on-line estimator: frame by frame, on surfaces whose true shape is known."""
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -92,11 +93,16 @@ def test_auto_takes_a_sheet_for_inextensible() -> None:
     assert error(estimates, truth) < 0.5 * static_error(reconstruction, truth)
 
 
-def test_auto_only_bends_a_sheet_whose_depth_sign_is_open() -> None:
+@pytest.mark.parametrize("deformation", ["auto", "bending"])
+def test_a_sheet_whose_depth_sign_is_open_stays_on_its_side(deformation: Deformation) -> None:
     W, truth = bending_sheet(ORTHOGRAPHIC)
-    reconstruction, estimates = reconstruct(W, ORTHOGRAPHIC, truth=truth)
-    assert reconstruction.deformation == "bending"
-    assert error(estimates, truth) < static_error(reconstruction, truth)
+    settings = replace(SETTINGS, deformation=deformation)
+    reconstruction, estimates = reconstruct(W, ORTHOGRAPHIC, settings, truth=truth)
+    assert reconstruction.deformation == ("inextensible" if deformation == "auto" else "bending")
+    assert error(estimates, truth) < 0.6 * static_error(reconstruction, truth)
+    linear = replace(settings, deformation="bending", energy="paper", priors={"rest": 1e-2})
+    _, stretched = reconstruct(W, ORTHOGRAPHIC, linear, truth=truth)
+    assert error(estimates, truth) < error(stretched, truth)
 
 
 def test_a_solid_is_factorised_then_deformed() -> None:
@@ -172,14 +178,32 @@ def test_auto_finds_a_solid() -> None:
     assert error(estimates, truth) < 0.06
 
 
-@pytest.mark.parametrize(("deformation", "fixed"), [("bending", [0, 1]), ("stretching", [2])])
-def test_constraints_are_rows_that_stay_zero(deformation: Deformation, fixed: list[int]) -> None:
-    W, truth = swelling_hill()
-    _, estimates = reconstruct(W, settings=replace(SETTINGS, deformation=deformation, refine_rest=False), truth=truth)
+@pytest.mark.parametrize(
+    ("deformation", "energy", "fixed"),
+    [("bending", "paper", [0, 1]), ("stretching", "paper", [2]), ("stretching", "anchored", [2])],
+)
+def test_constraints_are_rows_that_stay_zero(
+    deformation: Deformation, energy: Literal["anchored", "paper"], fixed: list[int]
+) -> None:
+    W, truth = swelling_hill(ORTHOGRAPHIC)
+    settings = replace(SETTINGS, deformation=deformation, energy=energy, refine_rest=False)
+    _, estimates = reconstruct(W, ORTHOGRAPHIC, settings, truth=truth)
     Lambda = np.stack([e.Lambda for e in estimates])
     np.testing.assert_array_equal(Lambda[:, fixed], 0.0)
     free = [row for row in range(3) if row not in fixed]
     assert np.abs(Lambda[:, free]).max() > 0.1
+
+
+def test_in_the_plane_a_bending_sheet_only_draws_in() -> None:
+    W, truth = bending_sheet()
+    settings = replace(SETTINGS, deformation="bending", refine_rest=False)
+    reconstruction, estimates = reconstruct(W, settings=settings, truth=truth)
+    Lambda = np.stack([e.Lambda for e in estimates]) / reconstruction.model.unit
+    edges = reconstruction.model.coarse_edges()
+    strain = np.abs(edges.strain(edges.vectors(Lambda)) / edges.length)
+    bent = np.abs(edges.strain(edges.vectors(Lambda * np.array([[0.0], [0.0], [1.0]]))) / edges.length)
+    assert np.abs(Lambda[:, :2]).max() > 0
+    assert strain.mean() < 0.5 * bent.mean()
 
 
 def test_inextensible_keeps_the_edges_better_than_general() -> None:

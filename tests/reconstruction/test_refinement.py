@@ -10,7 +10,7 @@ from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.model import ShapeEstimate
 from reconstruction.online import Reconstruction, Settings
-from reconstruction.refinement import FEWEST, Refinement, at_rest
+from reconstruction.refinement import FEWEST, Refinement
 from reconstruction.state import State
 from reconstruction.statistics import Statistics
 from tests.reconstruction.world import (
@@ -118,12 +118,3 @@ def test_frames_without_points_say_nothing_and_what_is_known_fades() -> None:
         refinement.take(nothing, replace(states[0], Lambda=refinement.rest[None].copy()))
     assert found > 0.7 * np.linalg.norm(rest)
     assert np.linalg.norm(refinement.rest) < 1e-3 * found
-
-
-def test_rows_that_are_not_free_are_put_at_rest() -> None:
-    state = random_state(np.random.default_rng(0), 3, 4)
-    rest = np.arange(12.0).reshape(3, 4)
-    placed = at_rest(state, rest, (2,))
-    np.testing.assert_array_equal(placed.Lambda[:, :2], np.broadcast_to(rest[:2], (3, 2, 4)))
-    np.testing.assert_array_equal(placed.Lambda[:, 2], state.Lambda[:, 2])
-    np.testing.assert_array_equal(at_rest(state, rest, (0, 1, 2)).Lambda, state.Lambda)
