@@ -22,8 +22,8 @@ class Model:
     modes: int = 20
     """Number of modes r."""
     deformation: Literal["auto", "bending", "stretching", "general", "inextensible"] = "auto"
-    """How the surface may deform: out of its plane, drawing in as a sheet does that keeps its lengths; in its plane; freely;
-    freely, but nearly keeping its lengths. Auto: general for a solid rest shape, inextensible for a flat one."""
+    """How the surface may deform: bend out of its plane, drawing in as a sheet does; in its plane; freely; freely, but
+    nearly keeping its lengths. Auto: general for a solid rest shape, inextensible for a flat one."""
     window: int = 5
     """Frames adjusted together."""
     energy: Literal["anchored", "paper"] = "anchored"
