@@ -45,7 +45,7 @@ PRIORS: dict[str, Prior] = {
     "smoothness": Prior(
         "λ_γ ‖ΔΛ'‖²",
         "The deformation changes slowly. More for noisy or missing points and high frame rates, less for fast motion.",
-        {"bending": 1e-3, "inextensible": 3e-4, OTHERWISE: 1e-1},
+        {"bending": 1e-3, "inextensible": 1e-4, OTHERWISE: 1e-1},
     ),
     "rotation": Prior(
         "λ_q ‖Δq‖²",

@@ -141,11 +141,12 @@ class SlidingWindow:
         return minimise(self._energy, stack(self._data), start, self._before, Solver())
 
     def _settled(self) -> State:
-        """The window as it is shown: where a guide led to, by the energy that it stands in for."""
+        """The newest frame as it is shown: where a guide led to, by the energy that it stands in for."""
         assert self.state is not None
         if self._shown is None:
             return self.state
-        return minimise(self._shown, stack(self._data), self.state, self._before, Solver()).state
+        before = self.state[-2:-1] if len(self.state) > 1 else self._before
+        return minimise(self._shown, self._data[-1], self.state[-1:], before, Solver()).state
 
     def _first_weights(self, W: Array, visible: Visibility) -> Array:
         """Visibility (p,) without the points whose motion since the last shape is out of all proportion."""
