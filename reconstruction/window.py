@@ -94,7 +94,7 @@ class SlidingWindow:
             window = join([self.state, self._leant(self.state[-1:])])
         if len(window) > self._length:
             window = self._without_oldest(window)
-        found = self._adjust(window)
+        found = self._adjust(with_newest(window, self._newest(self._energy, window)))
         if self._lost is not None:
             found, self._lost = min(found, self._adjust(self._lost), key=lambda one: float(one.value.sum())), None
         surprised = self._energy.edges is not None and found.value[-1] > max(SURPRISE * self._usual, CALM)
@@ -105,7 +105,8 @@ class SlidingWindow:
             if np.abs(weights - before).sum() < REWEIGHTED * len(weights):
                 break
             self._data[-1] = self.model.statistics(W, weights)
-            found = self._adjust(found.state)
+            alone = self._newest(self._energy, found.state)
+            found = replace(found, state=with_newest(found.state, alone), value=np.append(found.value[:-1], alone.value))
         newest = float(found.value[-1])
         self.spent += newest
         if np.isinf(self._usual) or surprised:
@@ -143,10 +144,7 @@ class SlidingWindow:
     def _settled(self) -> State:
         """The newest frame as it is shown: where a guide led to, by the energy that it stands in for."""
         assert self.state is not None
-        if self._shown is None:
-            return self.state
-        before = self.state[-2:-1] if len(self.state) > 1 else self._before
-        return minimise(self._shown, self._data[-1], self.state[-1:], before, Solver()).state
+        return self.state if self._shown is None else self._newest(self._shown, self.state).state
 
     def _first_weights(self, W: Array, visible: Visibility) -> Array:
         """Visibility (p,) without the points whose motion since the last shape is out of all proportion."""
@@ -159,6 +157,11 @@ class SlidingWindow:
         last = last / (1 + last[2] / self.model.camera.focal_px)
         off = off_the_common_motion(last, W, visible, GROSS_SIGMAS)
         return robust_weights(off, visible, GROSS_SIGMAS, LEAST_SIGMA * self.model.radius)
+
+    def _newest(self, energy: Energy, window: State) -> Solution:
+        """The newest frame adjusted alone, which takes a fraction of the whole window's time."""
+        before = window[-2:-1] if len(window) > 1 else self._before
+        return minimise(energy, self._data[-1], window[-1:], before, Solver())
 
     def _leant(self, last: State) -> State:
         """Where a new frame starts: as the last one, but never facing an orthographic camera exactly.
@@ -204,6 +207,11 @@ class SlidingWindow:
                 best = other
         self._switch = switch_between(found, best)
         return replace(best.state, Lambda=self._rest.rest[None].copy())
+
+
+def with_newest(window: State, newest: Solution) -> State:
+    """The window with another newest frame."""
+    return join([window[:-1], newest.state])
 
 
 def extrapolated(earlier: State, last: State) -> State:
