@@ -55,7 +55,7 @@ def accuracy(work: Work) -> Result:
         )
         missing = f", {line.missing:.0%} missing" if line.missing else ""
         others = f"paper, on its own flag: {PAPER_E3D}" if (line.file, line.missing) == (FLAG.file, PAPER_MISSING) else ""
-        headlines.append(Headline(line.name + missing, f"{line.deformation}, r = {line.modes}", e3d, static, others))
+        headlines.append(Headline(line.name + missing, line.setting, e3d, static, others))
         if trial.failure:
             remarks.append(f"{line.name}{missing}: {trial.failure}.")
     low, high = PAPER_BATCH_E3D

@@ -10,12 +10,7 @@ from app.reproduce.published import PAPER_BREAKS_AT, PAPER_E3D, PAPER_MISSING
 from app.reproduce.result import Result, Table, percent
 from app.reproduce.work import Effort, Trial, Work
 
-LINES = (
-    (FLAG, "euclidean"),
-    (replace(FLAG, name="the same with D_M"), "manhattan"),
-    (FLAG_PERSPECTIVE, "euclidean"),
-    (FACE, "euclidean"),
-)
+LINES = (FLAG, replace(FLAG, name="the same with D_M", metric="manhattan"), FLAG_PERSPECTIVE, FACE)
 TOP = 15.0  # %, of the chart
 BROKEN = 2.0  # times the error with nothing missing
 
@@ -30,8 +25,8 @@ def missing(work: Work) -> Result:
     hidden = shares(work.effort)
     series, rows = [], []
     failures: dict[str, list[str]] = {}  # what, and at which shares, one a seed
-    for color, (line, metric) in enumerate(LINES):
-        several = [trials(work, line, metric, share) for share in hidden]
+    for color, line in enumerate(LINES):
+        several = [trials(work, line, share) for share in hidden]
         for share, trials_of_share in zip(hidden, several, strict=True):
             for trial in trials_of_share:
                 if trial.failure:
@@ -60,9 +55,9 @@ def missing(work: Work) -> Result:
     return Result([table], {"missing.png": charts([panel])}, remarks=[explained, *failed])
 
 
-def trials(work: Work, line: Line, metric: str, share: float) -> list[Trial]:
+def trials(work: Work, line: Line, share: float) -> list[Trial]:
     """One a seed."""
-    configs = [line.config(work.data, metric=metric, missing=share, seed=seed) for seed in work.effort.seeds]
+    configs = [line.config(work.data, missing=share, seed=seed) for seed in work.effort.seeds]
     return [work.evaluated(config) for config in configs]
 
 
