@@ -14,7 +14,7 @@ from reconstruction.statistics import Statistics
 
 Array = NDArray[np.float64]
 
-PULL = 0.7  # towards the first rest shape; a frame in which all points are seen weighs about 1
+PULL = 0.4  # towards the first rest shape; a frame in which all points are seen weighs about 1
 KEPT = 0.98  # of what is known, frame by frame: some 50 frames count
 FEWEST = 5  # frames; fewer turn too little to tell rest from pose
 

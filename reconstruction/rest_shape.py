@@ -26,6 +26,7 @@ TILT_GAIN = 0.7  # a tilt is believed when it lowers the reprojection error belo
 SHARP = 2.0  # times worse that a clearly other tilt fits, where the tilt shows even in a smaller turn
 BENT_PX = 1.0  # reprojection error above which a sheet is not flat in all frames
 FEWEST_FLAT = 10  # frames that tell a tilt
+FAR = 3.0  # times the median distance from the middle, beyond which a point's depth is not believed
 STILL_PX = 0.5  # apparent motion, beyond that of a similarity, that is not noise
 
 
@@ -120,13 +121,21 @@ def rigid(W: Array, visible: Visibility, camera: Camera) -> RestShape:
 def factorize_often_seen(W: Array, visible: Visibility) -> RigidMotion:
     """Factorise the points seen in enough frames; the others start where they are seen, as deep as those beside them.
 
+    So do points that come out far from all others.
+
     Raises:
         ReconstructionError: too few frames or points.
     """
     often = visible.sum(axis=0) >= max(3, 0.2 * len(W))
     if often.sum() < 4:
         raise ReconstructionError("cannot recover a rest shape: fewer than 4 points stay visible; give --rest-shape plane")
-    motion = factorize(W[:, :, often], visible[:, often]).motion
+    while True:
+        motion = factorize(W[:, :, often], visible[:, often]).motion
+        distance = np.linalg.norm(motion.shape - np.median(motion.shape, axis=1, keepdims=True), axis=0)
+        near = distance < FAR * np.median(distance)
+        if near.all() or near.sum() < 4:
+            break
+        often[often] = near  # too few views, too much alike: the others would suffer, too
     shape = np.zeros((3, W.shape[2]))
     shape[:, often] = motion.shape
     for i in np.flatnonzero(~often & visible.any(axis=0)):

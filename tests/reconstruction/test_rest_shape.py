@@ -72,6 +72,21 @@ def test_points_often_lost_do_not_spoil_the_shape(rng: np.random.Generator) -> N
     assert shape_error(found[:, kept], shape[:, kept]) < 0.06
 
 
+@pytest.mark.parametrize("seed", [0, 6])
+def test_points_seen_in_a_few_frames_much_alike_do_not_spoil_the_shape(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shape = relief(rng, POINTS)
+    W, visible = views(shape, turns(FRAMES), ORTHOGRAPHIC)
+    W += rng.normal(0, 1.0, W.shape)
+    visible &= rng.random(visible.shape) > 0.5
+    few = rng.permutation(POINTS)[:15]
+    visible[:, few] = False
+    visible[4:7, few] = True  # hardly turned meanwhile
+    found = rest_shape.rigid(W, visible, ORTHOGRAPHIC).motion
+    sure = np.setdiff1d(np.arange(POINTS), few)
+    assert shape_error(found.shape[:, sure], (turns(FRAMES)[0] @ shape)[:, sure]) < 0.05
+
+
 def test_a_still_object_has_no_shape_and_the_error_says_how_much_it_turned() -> None:
     rng = np.random.default_rng(0)
     W, visible = views(relief(rng, POINTS), np.broadcast_to(np.eye(3), (FRAMES, 3, 3)), PERSPECTIVE)
