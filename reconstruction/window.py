@@ -26,6 +26,8 @@ from reconstruction.statistics import Statistics, stack
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]
 
+ADJUSTING = Solver()
+SETTLING = Solver(tolerance=1e-2)  # of what is only shown: nothing builds on it
 FEWEST_POINTS = 4
 ROBUST_SIGMAS = 8.0  # deviations from the model beyond which a point counts less
 GROSS_SIGMAS = 7.0  # deviations from the common motion beyond which a point is no sound start
@@ -139,12 +141,12 @@ class SlidingWindow:
         return window[1:]
 
     def _adjust(self, start: State) -> Solution:
-        return minimise(self._energy, stack(self._data), start, self._before, Solver())
+        return minimise(self._energy, stack(self._data), start, self._before, ADJUSTING)
 
     def _settled(self) -> State:
         """The newest frame as it is shown: where a guide led to, by the energy that it stands in for."""
         assert self.state is not None
-        return self.state if self._shown is None else self._newest(self._shown, self.state).state
+        return self.state if self._shown is None else self._newest(self._shown, self.state, SETTLING).state
 
     def _first_weights(self, W: Array, visible: Visibility) -> Array:
         """Visibility (p,) without the points whose motion since the last shape is out of all proportion."""
@@ -158,10 +160,10 @@ class SlidingWindow:
         off = off_the_common_motion(last, W, visible, GROSS_SIGMAS)
         return robust_weights(off, visible, GROSS_SIGMAS, LEAST_SIGMA * self.model.radius)
 
-    def _newest(self, energy: Energy, window: State) -> Solution:
+    def _newest(self, energy: Energy, window: State, solver: Solver = ADJUSTING) -> Solution:
         """The newest frame adjusted alone, which takes a fraction of the whole window's time."""
         before = window[-2:-1] if len(window) > 1 else self._before
-        return minimise(energy, self._data[-1], window[-1:], before, Solver())
+        return minimise(energy, self._data[-1], window[-1:], before, solver)
 
     def _leant(self, last: State) -> State:
         """Where a new frame starts: as the last one, but never facing an orthographic camera exactly.
@@ -199,10 +201,10 @@ class SlidingWindow:
         q = quaternion_from_rotation(self._motion.R[0] @ model.basis.Phi)
         start = State(q[None], seen.mean(axis=1)[None] / model.radius, np.array([log_s]), np.zeros((1, 3, 0)))
         energy = pose_energy(model.camera)
-        found = best = minimise(energy, data, start, None, Solver())
+        found = best = minimise(energy, data, start, None, ADJUSTING)
         for tilt in FIRST_TILT * tilt_axes():
             tilted = replace(start, q=quaternion_product(quaternion_exp(tilt), q)[None])
-            other = minimise(energy, data, tilted, None, Solver())
+            other = minimise(energy, data, tilted, None, ADJUSTING)
             if other.value[0] < TILT_GAIN * best.value[0]:
                 best = other
         self._switch = switch_between(found, best)
