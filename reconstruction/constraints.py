@@ -20,6 +20,8 @@ ROWS: dict[str, tuple[int, ...]] = {
     "inextensible": (0, 1, 2),
 }
 
+FIRM = {"rest": 1e-2}  # of the guide: with less it now and then changes its side
+
 
 def chosen(deformation: Deformation, rest: RestShape) -> Deformation:
     """The constraint itself for `auto`: a solid may do anything, a sheet keeps its lengths."""
@@ -62,4 +64,4 @@ def build_guide(model: Model, deformation: Deformation, *, paper: bool = False) 
     """
     if paper or model.camera.perspective or deformation not in ("bending", "inextensible"):
         return None
-    return replace(build_energy(model, "bending"), bending=None)
+    return replace(build_energy(model, "bending", FIRM), bending=None)
