@@ -1,7 +1,6 @@
 """What is known of how a surface deforms (paper §3.4): rows of Λ that stay zero, and how hard the others are held."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -31,16 +30,24 @@ def chosen(deformation: Deformation, rest: RestShape) -> Deformation:
 
 
 def build_energy(
-    model: Model, deformation: Deformation, chosen: Mapping[str, float] | None = None, *, paper: bool = False
+    model: Model,
+    deformation: Deformation,
+    chosen: Mapping[str, float] | None = None,
+    *,
+    paper: bool = False,
+    linear: bool = False,
 ) -> Energy:
     """The energy of a constraint on the deformation (paper §5, §3.4); `paper` as printed there: s = 1, a floating window.
 
-    `chosen` are weights of priors by name; the others keep their defaults.
+    `chosen` are weights of priors by name; the others keep their defaults. With `linear`, bending leaves rows α and β at
+    rest as the paper does, instead of drawing in.
     """
     weights = priors.weights(chosen or {}, deformation, perspective=model.camera.perspective, paper=paper)
     # A mode's eigenvalue says how much of the shape's extent it carries: weak modes are pulled to rest harder.
     stiffness = model.basis.eigenvalues**-0.5
     stiffness /= np.exp(np.log(stiffness).mean())
+    draws_in = deformation == "bending" and not (paper or linear)
+    edges = model.coarse_edges() if draws_in or weights["inextensibility"] else None
     return Energy(
         rotation=weights["rotation"],
         translation=weights["translation"],
@@ -51,8 +58,8 @@ def build_energy(
         rows=ROWS[deformation],
         free_scale=not paper,
         tied=not paper,
-        edges=model.coarse_edges() if weights["inextensibility"] else None,
-        bending=Bending(model.coarse_edges(), stiffness) if deformation == "bending" and not paper else None,
+        edges=edges if weights["inextensibility"] else None,
+        bending=Bending(edges, stiffness) if draws_in and edges else None,
     )
 
 
@@ -64,4 +71,4 @@ def build_guide(model: Model, deformation: Deformation, *, paper: bool = False) 
     """
     if paper or model.camera.perspective or deformation not in ("bending", "inextensible"):
         return None
-    return replace(build_energy(model, "bending", FIRM), bending=None)
+    return build_energy(model, "bending", FIRM, linear=True)

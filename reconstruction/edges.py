@@ -26,10 +26,10 @@ class CoarseEdges:
 
     def about(self, centre: Array) -> "CoarseEdges":
         """The same edges with the lengths of a rest shape refined to Λ̄' (3, r)."""
-        return replace(self, length=np.linalg.norm(self.rest + centre @ self.modes, axis=0))
+        return replace(self, length=np.linalg.norm(self.vectors(centre), axis=0))
 
     def vectors(self, Lambda: Array) -> Array:
-        """Edges (n, 3, e) of the shapes deformed by Λ' (n, 3, r)."""
+        """Edges (..., 3, e) of the shapes deformed by Λ' (..., 3, r)."""
         return np.asarray(self.rest + Lambda @ self.modes)
 
     def strain(self, vectors: Array) -> Array:
@@ -53,8 +53,7 @@ class Bending:
     def __init__(self, edges: CoarseEdges, stiffness: Array, centre: Array | None = None) -> None:
         self._edges, self._stiffness = edges, stiffness
         self._centre = np.zeros((3, len(stiffness))) if centre is None else centre
-        self._rest = edges.rest + self._centre @ edges.modes
-        length = np.linalg.norm(self._rest, axis=0)
+        self._rest, length = edges.vectors(self._centre), edges.about(self._centre).length
         count = len(length)
         stretch = (self._rest[:2, None] * edges.modes).reshape(-1, count) / length  # (2r, e) of unit Γ_α, Γ_β
         held = np.diag(GIVE * np.tile(stiffness, 2))

@@ -106,16 +106,16 @@ def evaluate(energy: Energy, data: Statistics, state: State, before: State | Non
 def linearise(energy: Energy, data: Statistics, state: State, before: State | None, value: Array | None = None) -> Normal:
     """Value (n,), if it is not known, gradient and Gauss-Newton blocks of the whole energy at a state."""
     n, r = len(state), state.Lambda.shape[2]
-    d = POSE + len(energy.rows) * r
     value = evaluate(energy, data, state, before) if value is None else value
+    rows = energy.rows if energy.bending is None else ALL_ROWS
+    d = POSE + len(rows) * r
     normal = Normal(value, np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((n - 1, d, d)))
-    if energy.bending is None:
-        add_data(normal, energy.rows, data, state)
-    else:
-        add_data_of_bending(normal, energy.bending, data, state)
-    add_rest(normal, energy, state)
+    add_data(normal, rows, data, state)
     if energy.edges is not None:
-        add_inextensibility(normal, energy, energy.edges, state)
+        add_inextensibility(normal, rows, energy.inextensibility, energy.edges, state)
+    if energy.bending is not None:
+        normal = following(normal, energy.bending.slope(state.Lambda))
+    add_rest(normal, energy, state)
     add_smoothness(normal, energy, state, before)
     if not energy.free_scale:
         normal.gradient[:, 5] = 0.0
@@ -158,18 +158,15 @@ def add_data(normal: Normal, free_rows: tuple[int, ...], data: Statistics, state
     by_rows += kron.transpose(0, 1, 3, 2, 4)
 
 
-def add_data_of_bending(normal: Normal, bending: Bending, data: Statistics, state: State) -> None:
-    """Reprojection where rows α and β follow from row τ: the same by the chain rule through them."""
-    n, r = len(state), state.Lambda.shape[2]
-    d = POSE + 3 * r
-    every = Normal(normal.value, np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((0, d, d)))
-    add_data(every, ALL_ROWS, data, state)
+def following(normal: Normal, slope: Array) -> Normal:
+    """The same by row τ alone, from which all rows follow with the given slope (n, 3r, r): the chain rule through them."""
+    n, d, r = len(slope), normal.gradient.shape[1], slope.shape[2]
     J = np.zeros((n, d, POSE + r))
     J[:, :POSE, :POSE] = np.eye(POSE)
-    J[:, POSE:, POSE:] = bending.slope(state.Lambda)
+    J[:, POSE:, POSE:] = slope
     Jt = J.transpose(0, 2, 1)
-    normal.gradient += (Jt @ every.gradient[:, :, None])[:, :, 0]
-    normal.diagonal += Jt @ every.diagonal @ J
+    gradient = (Jt @ normal.gradient[:, :, None])[:, :, 0]
+    return Normal(normal.value, gradient, Jt @ normal.diagonal @ J, np.zeros((n - 1, POSE + r, POSE + r)))
 
 
 def add_rest(normal: Normal, energy: Energy, state: State) -> None:
@@ -180,14 +177,14 @@ def add_rest(normal: Normal, energy: Energy, state: State) -> None:
     diagonals(normal.diagonal)[:, POSE:] += weights
 
 
-def add_inextensibility(normal: Normal, energy: Energy, edges: CoarseEdges, state: State) -> None:
+def add_inextensibility(normal: Normal, free_rows: tuple[int, ...], kappa: float, edges: CoarseEdges, state: State) -> None:
     """κ mean_e ρ_e²: edges of the coarse mesh keep their rest length."""
     n, count = len(state), len(edges.length)
     vectors = edges.vectors(state.Lambda)
     strain = edges.strain(vectors)
-    direction = (vectors / edges.length)[:, energy.rows, None, :]
+    direction = (vectors / edges.length)[:, free_rows, None, :]
     J = (direction * edges.modes).reshape(n, -1, count)
-    weight = energy.inextensibility / count
+    weight = kappa / count
     normal.gradient[:, POSE:] += weight * (J @ strain[:, :, None])[:, :, 0]
     normal.diagonal[:, POSE:, POSE:] += weight * (J @ J.transpose(0, 2, 1))
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,12 +129,15 @@ class Trials:
         model = build_model(rest, camera, min(MODES, self._W.shape[2] - 1))
         return model, build_energy(model, self._deformation, self._priors)
 
+    @cached_property
+    def _first_image(self) -> Array:
+        return rest_shape.first_image(self._W, self._visible)
+
     def _tilted(self, camera: Camera) -> RestShape:
         """The flat rest shape, whose tilt depends on the focal length: looked for unless that of one nearby will do."""
         near = [axes for focal_px, axes in self._axes.items() if abs(np.log(camera.focal_px / focal_px)) < np.log(NEARBY)]
         if near:
-            image = rest_shape.first_image(self._W, self._visible)
-            return replace(self._rest, motion=sheet(image, near[-1], camera).in_first_frame())
+            return replace(self._rest, motion=sheet(self._first_image, near[-1], camera).in_first_frame())
         rest = rest_shape.plane(self._W, self._visible, camera)
         self._axes[camera.focal_px] = principal_axes(rest.motion.shape)
         return rest

@@ -14,7 +14,6 @@ from reconstruction.state import State
 from reconstruction.statistics import Statistics
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
