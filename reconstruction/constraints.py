@@ -19,7 +19,7 @@ ROWS: dict[str, tuple[int, ...]] = {
     "inextensible": (0, 1, 2),
 }
 
-FIRM = {"rest": 1e-2}  # of the guide: with less it now and then changes its side
+FIRM = {"rest": 1e-2}  # of the first guide: with less it now and then changes its side
 
 
 def chosen(deformation: Deformation, rest: RestShape) -> Deformation:
@@ -63,12 +63,14 @@ def build_energy(
     )
 
 
-def build_guide(model: Model, deformation: Deformation, *, paper: bool = False) -> Energy | None:
-    """What leads to the branch that an energy of kept lengths is to start from, if it needs that.
+def build_guides(model: Model, deformation: Deformation, *, paper: bool = False) -> tuple[Energy, ...]:
+    """What leads, one after the other, to where an energy of kept lengths is to start from, if it needs that.
 
     An orthographic camera sees a bend and its mirror image alike and lengths are kept by either, so now and then the wrong
-    one would be taken for good. Bending with rows α and β at rest, as the paper has it, stays on its side.
+    one would be taken for good. Bending with rows α and β at rest, as the paper has it, stays on its side. From there it is
+    let draw in as it bends, before its rows α and β are free to do what only edges hold back.
     """
     if paper or model.camera.perspective or deformation not in ("bending", "inextensible"):
-        return None
-    return build_energy(model, "bending", FIRM, linear=True)
+        return ()
+    linear = build_energy(model, "bending", FIRM, linear=True)
+    return (linear,) if deformation == "bending" else (linear, build_energy(model, "bending"))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError, focal, priors, rest_shape
 from reconstruction.camera import Camera
-from reconstruction.constraints import Deformation, build_energy, build_guide, chosen
+from reconstruction.constraints import Deformation, build_energy, build_guides, chosen
 from reconstruction.factorization import view_turn_degrees
 from reconstruction.mesh import Mesh
 from reconstruction.model import Model, ShapeEstimate, build_model
@@ -201,7 +201,7 @@ class Reconstruction:
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
         refine = self.settings.refine_rest and not paper
-        guide = build_guide(model, self.deformation, paper=paper)
-        self.window = SlidingWindow(model, energy, self.settings.window, rest.motion, refine=refine, guide=guide)
+        guides = build_guides(model, self.deformation, paper=paper)
+        self.window = SlidingWindow(model, energy, self.settings.window, rest.motion, refine=refine, guides=guides)
         waiting, self._waiting = self._waiting, []
         return [self.window.advance(W, visible) for W, visible in waiting]

@@ -1,5 +1,6 @@
 """Bundle adjustment over a sliding window of frames, robust to outliers (paper §5)."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +29,7 @@ Visibility = NDArray[np.bool_]
 
 ADJUSTING = Solver()
 SETTLING = Solver(tolerance=1e-2)  # of what is only shown: nothing builds on it
+LEADING = Solver(iterations=3)  # to where that starts from
 FEWEST_POINTS = 4
 ROBUST_SIGMAS = 8.0  # deviations from the model beyond which a point counts less
 GROSS_SIGMAS = 7.0  # deviations from the common motion beyond which a point is no sound start
@@ -53,7 +55,8 @@ class SlidingWindow:
         length: frames 𝒲 in the window.
         motion: how the rest shape is seen in the first frame.
         refine: whether frames that leave the window refine the rest shape.
-        guide: an energy that stands in for it until the shapes are to be shown, where it would lose the branch it is on.
+        guides: energies that lead to it where it would lose the branch it is on: the first stands in for it in the window,
+            and the newest frame, before it is shown, is adjusted by each of the others in turn.
 
     Attributes:
         state: the window's frames; None before the first.
@@ -68,13 +71,13 @@ class SlidingWindow:
         motion: RigidMotion,
         *,
         refine: bool = False,
-        guide: Energy | None = None,
+        guides: Sequence[Energy] = (),
     ) -> None:
         self.model = model
         self.state: State | None = None
         self.spent = 0.0
-        self._energy, self._length, self._motion = guide or energy, length, motion
-        self._shown = energy if guide else None
+        self._energy, *self._shown = *guides, energy
+        self._length, self._motion = length, motion
         self._before: State | None = None  # the frame that has left the window
         self._lost: State | None = None  # the last frame before everything started anew
         self._data: list[Statistics] = []
@@ -137,16 +140,20 @@ class SlidingWindow:
         if self._refine:
             self._rest.take(data, self._before)
             self._energy = self._energy.about(self._rest.rest)
-            self._shown = self._shown and self._shown.about(self._rest.rest)
+            self._shown = [energy.about(self._rest.rest) for energy in self._shown]
         return window[1:]
 
     def _adjust(self, start: State) -> Solution:
         return minimise(self._energy, stack(self._data), start, self._before, ADJUSTING)
 
     def _settled(self) -> State:
-        """The newest frame as it is shown: where a guide led to, by the energy that it stands in for."""
+        """The frames with the newest as it is shown: where the guides lead to, and the energy from there."""
         assert self.state is not None
-        return self.state if self._shown is None else self._newest(self._shown, self.state, SETTLING).state
+        settled = self.state
+        for energy in self._shown:
+            solver = SETTLING if energy is self._shown[-1] else LEADING
+            settled = with_newest(settled, self._newest(energy, settled, solver))
+        return settled
 
     def _first_weights(self, W: Array, visible: Visibility) -> Array:
         """Visibility (p,) without the points whose motion since the last shape is out of all proportion."""
