@@ -16,15 +16,16 @@ class Model:
 
     bootstrap_frames: Literal["auto"] | int = "auto"
     """Frames the rest shape comes from; auto decides from the evidence."""
-    metric: Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"] = "chi-squared"
+    metric: Literal["auto", "euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"] = "auto"
     """Distance between points that the modes come from: straight, along the mesh's edges, in units of the extent along
-    each axis, chi-squared of the coordinates, or Jensen-Shannon of the nearness to landmarks."""
+    each axis, chi-squared of the coordinates, or Jensen-Shannon of the nearness to landmarks. Auto: Jensen-Shannon for a
+    solid rest shape, chi-squared for a flat one."""
     modes: int = 20
     """Number of modes r."""
     deformation: Literal["auto", "bending", "stretching", "general", "inextensible"] = "auto"
     """How the surface may deform: bend out of its plane, drawing in as a sheet does; in its plane; freely; freely, but
     nearly keeping its lengths. Auto: general for a solid rest shape, inextensible for a flat one."""
-    window: int = 5
+    window: int = 3
     """Frames adjusted together."""
     energy: Literal["anchored", "paper"] = "anchored"
     """Anchored: tied to the past and pulled to rest. Paper: the paper's section 5 as printed (orthographic)."""

@@ -66,6 +66,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Words:
         **reconstruction.focal_words,
         "bootstrap_frames": reconstruction.bootstrap_frames,
         "deformation": reconstruction.deformation,
+        "metric": reconstruction.metric,
         "priors": reconstruction.weights,
         "branch_switches": collected.switches,
         "reprojection_rms": collected.reprojection_rms_px,

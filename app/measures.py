@@ -117,6 +117,7 @@ def as_words(playback: Playback, measured: Measures) -> Words:
         "rest_shape_note": summary.get("rest_shape_note", infos[0] if infos and playback.modelled else None),
         "deformation": summary.get("deformation", playback.configuration.get("deformation")),
         "points": playback.visible.shape[1],
+        "metric": summary.get("metric", playback.configuration.get("metric")),
         "modes": playback.Lambda.shape[2] if playback.modelled else playback.configuration.get("modes"),
         "visible_share": {
             "mean": float(measured.visible_share.mean()),

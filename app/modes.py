@@ -13,8 +13,9 @@ from app.config_export import Modes
 from app.progress import Progress
 from app.results import check_free, writable
 from reconstruction import distances
+from reconstruction.distances import Metric, MetricChoice, fitting
 from reconstruction.mesh import Mesh
-from reconstruction.modes import EXACT_POINTS, Metric, ModalBasis, doubly_centred
+from reconstruction.modes import EXACT_POINTS, ModalBasis, doubly_centred, is_flat
 
 Array = NDArray[np.float64]
 
@@ -54,8 +55,8 @@ def of_recording(command: Modes, progress: Progress) -> tuple[str, ModalBasis, M
     playback = Playback.load(command.source)
     for note in playback.notes:
         progress.say(note)
-    metric = str(playback.configuration.get("metric", "euclidean"))
-    return playback.name, playback.basis, playback.mesh, metric
+    asked = cast(MetricChoice, playback.configuration.get("metric", "euclidean"))
+    return playback.name, playback.basis, playback.mesh, fitting(asked, flat=is_flat(playback.basis.rest))
 
 
 def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, str]:
@@ -75,7 +76,8 @@ def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh
         reconstruction.finish()
     assert reconstruction.rest is not None
     progress.say(reconstruction.rest.note)
-    return Path(command.source).stem, reconstruction.model.basis, reconstruction.model.mesh, command.model.metric
+    assert reconstruction.metric is not None
+    return Path(command.source).stem, reconstruction.model.basis, reconstruction.model.mesh, reconstruction.metric
 
 
 def spectrum(basis: ModalBasis, mesh: Mesh, metric: str) -> Array:

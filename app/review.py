@@ -111,7 +111,7 @@ def as_rows(words: Words) -> dict[str, str]:
         f"{words['frames_with_shape']} with a shape",
         "phases": ", ".join(f"{p['phase']} {p['first']}–{p['last']}" for p in phases),
         "rest shape": known(words["rest_shape"]) + (f": {note}" if note else ""),
-        "deformation": f"{known(words['deformation'])}, {words['modes']} modes",
+        "deformation": f"{known(words['deformation'])}, {words['modes']} modes of {known(words['metric'])} distances",
         "points": f"{words['points']}, {words['losses']} losses, {words['recoveries']} recoveries",
         "visible": f"{share['mean']:.1%} (lowest {share['min']:.1%}, last frame {share['last']:.1%})",
         "reprojection, px": named(error, ("mean", "median", "p95", "max", "rms"), "{:.3g}") if error else "",

@@ -216,6 +216,7 @@ class Session:
         take, reconstruction = self._take, self._take.reconstruction
         rest, model = reconstruction.rest, reconstruction.model
         assert rest is not None
+        assert reconstruction.metric is not None
         for note in filter(None, (rest.note, reconstruction.focal_note)):
             self._recording.event(index, time_s, note)
             self._progress.say(note)
@@ -223,7 +224,7 @@ class Session:
         if self._picture is not None and take.config.texture:
             laid = Laid(self._config.place, self._config.opacity)
             first = painted(first, take.points_px, model, self._picture, laid)
-        self._recording.model(model, first, take.points_px, self._config.model.metric)
+        self._recording.model(model, first, take.points_px, reconstruction.metric)
         if self._observer:
             self._observer.begin(take.first, take.points_px, model, self._fps)
         self._modelled = True

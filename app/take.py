@@ -111,6 +111,7 @@ class Take:
             "rest_shape_note": rest.note if rest else None,
             "bootstrap_frames": self.reconstruction.bootstrap_frames,
             "deformation": self.reconstruction.deformation,
+            "metric": self.reconstruction.metric,
             "priors": self.reconstruction.weights,
             **self.reconstruction.focal_words,
             "branch_switches": self.collected.switches,

@@ -14,10 +14,18 @@ from reconstruction.mesh import farthest_points
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Metric = Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"]
+MetricChoice = Literal["auto"] | Metric
 
 THINNEST = 0.03  # variance added to each principal axis, as a share of their mean: a flat sheet has none across
 AWAY_FROM_ZERO = 0.05  # smallest coordinate of the chi-squared distance, in RMS radii: it compares positive numbers
 LANDMARKS, BLUR = 64, 0.5  # points that a point is described by, and how far it spreads among them, in RMS radii
+
+
+def fitting(metric: MetricChoice, *, flat: bool) -> Metric:
+    """The metric itself for `auto`: of a sheet free edges bend, of a solid what is near moves along."""
+    if metric != "auto":
+        return metric
+    return "chi-squared" if flat else "jensen-shannon"
 
 
 def dissimilarity(metric: Metric, rest: Array, edges: Indices, to: Indices | None = None) -> Array:

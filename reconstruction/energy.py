@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from reconstruction import statistics
 from reconstruction.camera import left_matrix
 from reconstruction.edges import Bending, CoarseEdges
+from reconstruction.past import Past
 from reconstruction.state import POSE, State, join
 from reconstruction.statistics import Statistics
 
@@ -31,7 +32,8 @@ class Energy:
         rotation: λ_q on ‖Δq‖² between neighbouring frames.
         translation: λ_t on ‖Δt‖².
         scale: λ_s on (Δ log s)².
-        smoothness: λ_γ on ‖ΔΛ'‖².
+        smoothness: λ_γ on ‖ΔΛ'‖²; (r,) where each mode has its own.
+        jump: what smoothness adds up to where a change passes for a jump, from which on it costs ever less more.
         rest: λ_0 on ‖Λ' − Λ̄'‖², the pull to the rest shape; (r,) where each mode has its own.
         centre: Λ̄' (3, r), the rest shape as refined meanwhile.
         inextensibility: κ on the mean squared edge strain term of `edges`.
@@ -45,7 +47,8 @@ class Energy:
     rotation: float = 3e-4
     translation: float = 0.0
     scale: float = 1e-3
-    smoothness: float = 1e-2
+    smoothness: float | Array = 1e-2
+    jump: float = np.inf
     rest: float | Array = 1e-2
     centre: float | Array = 0.0
     inextensibility: float = 0.0
@@ -90,8 +93,8 @@ class Normal:
     coupling: Array
 
 
-def evaluate(energy: Energy, data: Statistics, state: State, before: State | None) -> Array:
-    """Energy (n,) per frame; `before` is the frame that has left the window (n = 1)."""
+def evaluate(energy: Energy, data: Statistics, state: State, before: Past | None) -> Array:
+    """Energy (n,) per frame; `before` is the frame that has left the window."""
     free = (state.Lambda - energy.centre)[:, energy.rows]
     value = statistics.value(data, state.matrices()) + (energy.rest * free**2).sum(axis=(1, 2))
     if energy.edges is not None:
@@ -99,11 +102,11 @@ def evaluate(energy: Energy, data: Statistics, state: State, before: State | Non
         value += energy.inextensibility * (strain**2).mean(axis=1)
     value[1:] += smoothness(energy, state[:-1], state[1:])
     if energy.tied and before is not None:
-        value[:1] += smoothness(energy, before, state[:1])
+        value[:1] += smoothness(energy, before.state, state[:1], before.hold)
     return np.asarray(value)
 
 
-def linearise(energy: Energy, data: Statistics, state: State, before: State | None, value: Array | None = None) -> Normal:
+def linearise(energy: Energy, data: Statistics, state: State, before: Past | None, value: Array | None = None) -> Normal:
     """Value (n,), if it is not known, gradient and Gauss-Newton blocks of the whole energy at a state."""
     n, r = len(state), state.Lambda.shape[2]
     value = evaluate(energy, data, state, before) if value is None else value
@@ -122,6 +125,14 @@ def linearise(energy: Energy, data: Statistics, state: State, before: State | No
         normal.diagonal[:, 5, :] = normal.diagonal[:, :, 5] = 0.0
         normal.diagonal[:, 5, 5] = 1.0
         normal.coupling[:, 5, :] = normal.coupling[:, :, 5] = 0.0
+    return normal
+
+
+def data_normal(data: Statistics, state: State) -> Normal:
+    """The data term alone, all rows of Λ free."""
+    n, d = len(state), POSE + state.Lambda[0].size
+    normal = Normal(np.zeros(n), np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((n - 1, d, d)))
+    add_data(normal, ALL_ROWS, data, state)
     return normal
 
 
@@ -189,14 +200,35 @@ def add_inextensibility(normal: Normal, free_rows: tuple[int, ...], kappa: float
     normal.diagonal[:, POSE:, POSE:] += weight * (J @ J.transpose(0, 2, 1))
 
 
-def smoothness(energy: Energy, earlier: State, later: State) -> Array:
-    """λ_q‖Δq‖² + λ_t‖Δt‖² + λ_s(Δ log s)² + λ_γ‖ΔΛ'‖² (n,) between frames and their successors."""
+def smoothness(energy: Energy, earlier: State, later: State, hold: Array | None = None) -> Array:
+    """Change (n,) between frames and their successors: λ_q‖Δq‖² + λ_t‖Δt‖² + λ_s(Δ log s)² + that of Λ', see `change_of`.
+
+    With `hold` the latter is ΔΛ'ᵀ H ΔΛ'.
+    """
+    change, cost, _ = change_of(energy, earlier, later)
     return np.asarray(
         energy.rotation * (quaternion_difference(earlier.q, later.q) ** 2).sum(axis=1)
         + energy.translation * ((later.t - earlier.t) ** 2).sum(axis=1)
         + energy.scale * (later.log_s - earlier.log_s) ** 2
-        + energy.smoothness * ((later.Lambda - earlier.Lambda)[:, energy.rows] ** 2).sum(axis=(1, 2))
+        + (cost if hold is None else ((change @ hold) * change).sum(axis=1))
     )
+
+
+def change_of(energy: Energy, earlier: State, later: State) -> tuple[Array, Array, Array]:
+    """Change ΔΛ' (n, k) of the free rows from frames to their successors, its cost (n,) and weights (n, k) on its squares.
+
+    The cost is λ_γ‖ΔΛ'‖²; with jumps, of size j, it is j log(1 + λ_γ‖ΔΛ'‖²/j), as of a heavy-tailed distribution: what
+    holds still is held, what moves is let go.
+    """
+    change = (later.Lambda - earlier.Lambda)[:, energy.rows, :]
+    n, rows, r = change.shape
+    weights = np.broadcast_to(energy.smoothness, change.shape).reshape(n, rows * r)
+    change = change.reshape(n, rows * r)
+    cost = (weights * change**2).sum(axis=1)
+    if np.isfinite(energy.jump):
+        weights = weights / (1 + cost / energy.jump)[:, None]
+        cost = energy.jump * np.log1p(cost / energy.jump)
+    return change, cost, weights
 
 
 def quaternion_difference(earlier: Array, later: Array) -> Array:
@@ -210,10 +242,10 @@ def quaternion_tangent(q: Array) -> Array:
     return 0.5 * left_matrix(q)[..., 1:]
 
 
-def add_smoothness(normal: Normal, energy: Energy, state: State, before: State | None) -> None:
+def add_smoothness(normal: Normal, energy: Energy, state: State, before: Past | None) -> None:
     """Differences of neighbours inside the window, and of the oldest frame to the one that has left it."""
-    tied = energy.tied and before is not None
-    chain = join([before, state]) if tied and before is not None else state
+    past = before if energy.tied else None
+    chain = state if past is None else join([past.state, state])
     earlier, later = chain[:-1], chain[1:]
     n, d = len(later), normal.gradient.shape[1]
     if n == 0:
@@ -222,22 +254,24 @@ def add_smoothness(normal: Normal, energy: Energy, state: State, before: State |
     tangents = quaternion_tangent(chain.q)
     J_earlier, J_later = -nearer * tangents[:-1], tangents[1:]
     delta = quaternion_difference(earlier.q, later.q)[:, :, None]
-    weights = np.full(d, energy.smoothness)
-    weights[3:5], weights[5] = energy.translation, energy.scale
-    change = np.zeros((n, d))
-    change[:, 3:5] = later.t - earlier.t
-    change[:, 5] = later.log_s - earlier.log_s
-    change[:, POSE:] = (later.Lambda - earlier.Lambda)[:, energy.rows, :].reshape(n, -1)
-    for J, sign, frames in ((J_later, 1.0, slice(n)), (J_earlier, -1.0, slice(1, n) if tied else slice(n))):
-        target = slice(0 if tied else 1, None) if sign > 0 else slice(0, len(state) - 1)
+    change, weights = np.zeros((n, d)), np.zeros((n, d))
+    change[:, 3:5], weights[:, 3:5] = later.t - earlier.t, energy.translation
+    change[:, 5], weights[:, 5] = later.log_s - earlier.log_s, energy.scale
+    change[:, POSE:], _, weights[:, POSE:] = change_of(energy, earlier, later)
+    if past is not None and past.hold is not None:
+        weights[0, POSE:] = 0.0
+        normal.gradient[0, POSE:] += past.hold @ change[0, POSE:]
+        normal.diagonal[0, POSE:, POSE:] += past.hold
+    inner = slice(0 if past is None else 1, n)  # the others tie frames of the window to each other
+    for J, sign, frames in ((J_later, 1.0, slice(n)), (J_earlier, -1.0, inner)):
+        target = slice(len(state) - n, None) if sign > 0 else slice(len(state) - 1)
         Jt = energy.rotation * J[frames].transpose(0, 2, 1)
         normal.gradient[target, :3] += (Jt @ delta[frames])[:, :, 0]
-        normal.gradient[target, 3:] += sign * weights[3:] * change[frames, 3:]
+        normal.gradient[target, 3:] += sign * weights[frames, 3:] * change[frames, 3:]
         normal.diagonal[target, :3, :3] += Jt @ J[frames]
-        diagonals(normal.diagonal[target])[:, 3:] += weights[3:]
-    inner = slice(1, n) if tied else slice(n)
+        diagonals(normal.diagonal[target])[:, 3:] += weights[frames, 3:]
     normal.coupling[:, :3, :3] += energy.rotation * J_earlier[inner].transpose(0, 2, 1) @ J_later[inner]
-    diagonals(normal.coupling)[:, 3:] -= weights[3:]
+    diagonals(normal.coupling)[:, 3:] -= weights[inner, 3:]
 
 
 def diagonals(blocks: Array) -> Array:

@@ -13,6 +13,7 @@ from reconstruction.mesh import Mesh
 Array = NDArray[np.float64]
 Metric = distances.Metric
 
+FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
 EXACT_POINTS = 4000  # with more, modes come from the distances to landmarks: all of D would take minutes and gigabytes
 
 
@@ -86,6 +87,12 @@ def principal_axes(rest: Array) -> Array:
     if np.linalg.det(Phi) < 0:
         Phi[:, 2] *= -1
     return Phi
+
+
+def is_flat(rest: Array) -> bool:
+    """Whether a shape (3, p) is a sheet: hardly any relief for its size."""
+    extent = np.linalg.svd(rest - rest.mean(axis=1, keepdims=True), compute_uv=False)
+    return bool(extent[2] < FLAT_RELIEF * extent[0])
 
 
 def with_fixed_signs(vectors: Array) -> Array:

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from reconstruction import ReconstructionError, focal, priors, rest_shape
 from reconstruction.camera import Camera
 from reconstruction.constraints import Deformation, build_energy, build_guides, chosen
+from reconstruction.distances import Metric, MetricChoice, fitting
 from reconstruction.factorization import view_turn_degrees
 from reconstruction.mesh import Mesh
 from reconstruction.model import Model, ShapeEstimate, build_model
-from reconstruction.modes import Metric
 from reconstruction.outliers import without_outliers
 from reconstruction.priors import Weights
 from reconstruction.rest_shape import TURN_DEGREES, RestShape
@@ -42,7 +42,7 @@ class Settings:
         rest_shape: auto, rigid or plane; `given` overrides it.
         bootstrap_frames: frames the rest shape comes from; None decides from the evidence.
         modes: r.
-        metric: dissimilarity the modes come from.
+        metric: dissimilarity the modes come from; auto by whether the rest shape is flat.
         deformation: constraint on Λ (§3.4).
         window: frames 𝒲 adjusted together.
         energy: anchored (tied to the past, pulled to rest) or the paper's §5 as printed.
@@ -54,9 +54,9 @@ class Settings:
     rest_shape: Literal["auto", "rigid", "plane"] = "auto"
     bootstrap_frames: int | None = None
     modes: int = 20
-    metric: Metric = "chi-squared"
+    metric: MetricChoice = "auto"
     deformation: Deformation = "auto"
-    window: int = 5
+    window: int = 3
     energy: Literal["anchored", "paper"] = "anchored"
     priors: Mapping[str, float] = field(default_factory=dict)
     refine_rest: bool = True
@@ -76,6 +76,7 @@ class Reconstruction:
         rest: the rest shape, once there is one.
         window: the sliding window, once there is a rest shape.
         bootstrap_frames: frames the bootstrap took.
+        metric: the dissimilarity in force; None until the rest shape decides.
         deformation: the constraint in force; auto until the rest shape decides.
         focal_note: what the first frames say about the focal length, in words; empty if they were not asked.
     """
@@ -91,6 +92,7 @@ class Reconstruction:
         self._mesh = mesh
         self.window: SlidingWindow | None = None
         self.bootstrap_frames = 0
+        self.metric: Metric | None = None
         self.deformation = settings.deformation
         self.focal_note = ""
         self._waiting: list[tuple[Array, Visibility]] = []
@@ -197,7 +199,8 @@ class Reconstruction:
     def _start(self, rest: RestShape) -> list[ShapeEstimate]:
         self.rest, self.bootstrap_frames = rest, len(self._waiting)
         self.deformation = chosen(self.deformation, rest)
-        model = build_model(rest, self.camera, self.settings.modes, self.settings.metric, self._mesh)
+        self.metric = fitting(self.settings.metric, flat=rest.flat)
+        model = build_model(rest, self.camera, self.settings.modes, self.metric, self._mesh)
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
         refine = self.settings.refine_rest and not paper

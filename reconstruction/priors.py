@@ -14,6 +14,7 @@ Weights = dict[str, float]
 ORTHOGRAPHIC_SCALE = 1.0  # λ_s without depth, where only a zoom changes the scale
 PERSPECTIVE_SCALE = 1e-3  # λ_s with depth, where moving towards the camera does
 OTHERWISE = "otherwise"
+STILL = 3e-3  # σ: change between frames, of the shape's size, up to which a surface holds still
 
 
 @dataclass(frozen=True)
@@ -40,17 +41,17 @@ PRIORS: dict[str, Prior] = {
         "λ_0 Σ_k ω_k ‖Λ'_k − Λ̄'_k‖², ω_k ∝ eigenvalue_k^(−½)",
         "Pulls to the rest shape, weak modes harder. Without it, modes 1 and 2 do what tilt and scale should. More where "
         "points are few or noisy, less where the surface deforms far.",
-        {"bending": 5e-3, "inextensible": 3e-4, OTHERWISE: 2e-2},
+        {"bending": 5e-3, "inextensible": 3e-4, OTHERWISE: 1e-2},
     ),
     "smoothness": Prior(
-        "λ_γ ‖ΔΛ'‖²",
+        "λ_γ Σ_k ω_k ‖ΔΛ'_k‖²; where a surface may do anything, λ_γ σ² log(1 + Σ_k ω_k ‖ΔΛ'_k‖²/σ²), σ = 0.3 %",
         "The deformation changes slowly. More for noisy or missing points and high frame rates, less for fast motion.",
-        {"bending": 1e-3, "inextensible": 1e-4, OTHERWISE: 1e-1},
+        {"bending": 1e-3, "inextensible": 1e-4, OTHERWISE: 6.0},
     ),
     "rotation": Prior(
         "λ_q ‖Δq‖²",
         "The object turns slowly (q is the unit quaternion). More where the pose jitters.",
-        {OTHERWISE: 3e-4},
+        {"general": 1e-4, OTHERWISE: 3e-4},
     ),
     "translation": Prior(
         "λ_t ‖Δt‖²",

@@ -8,9 +8,8 @@ deformation add up to one normal system for a shift that they all share; no poin
 import numpy as np
 from numpy.typing import NDArray
 
-from reconstruction.energy import ALL_ROWS, Normal, add_data
-from reconstruction.state import POSE, State
-from reconstruction.statistics import Statistics
+from reconstruction.energy import Normal
+from reconstruction.state import POSE
 
 Array = NDArray[np.float64]
 
@@ -34,12 +33,9 @@ class Refinement:
         self._hessian, self._right = np.zeros((3 * modes, 3 * modes)), np.zeros(3 * modes)
         self._frames = 0
 
-    def take(self, data: Statistics, state: State) -> None:
-        """Learn from one settled frame (n = 1), which was deformed about the rest as it is now."""
-        d = POSE + self.rest.size
-        normal = Normal(np.zeros(1), np.zeros((1, d)), np.zeros((1, d, d)), np.zeros((0, d, d)))
-        add_data(normal, ALL_ROWS, data, state)
-        hessian, gradient = normal.diagonal[0, POSE:, POSE:], normal.gradient[0, POSE:]
+    def take(self, seen: Normal) -> None:
+        """Learn from the data term of one settled frame (n = 1), which was deformed about the rest as it is now."""
+        hessian, gradient = seen.diagonal[0, POSE:, POSE:], seen.gradient[0, POSE:]
         self._hessian = KEPT * self._hessian + hessian
         self._right = KEPT * self._right + hessian @ self.rest.ravel() - gradient
         self._frames += 1

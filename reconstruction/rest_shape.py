@@ -10,6 +10,7 @@ from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.factorization import Factorization, affine_structure, factorize, view_turn_degrees
 from reconstruction.mesh import farthest_points
+from reconstruction.modes import is_flat
 from reconstruction.rigid import RigidMotion, bundle_adjust, follow
 from reconstruction.sheet import best_tilted, sheet
 
@@ -21,7 +22,6 @@ TURN_DEGREES = 10.0  # less turn than this and depth drowns in noise
 RELIEF_OVER_NOISE = 3.0  # third over fourth singular value of the observations
 HALVES_AGREE = 0.10  # relative difference of the shapes of even and odd frames
 JUDGING_POINTS = 150  # well-spread points are enough to decide on
-FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
 TILT_GAIN = 0.7  # a tilt is believed when it lowers the reprojection error below this share of the frontal one's
 SHARP = 2.0  # times worse that a clearly other tilt fits, where the tilt shows even in a smaller turn
 BENT_PX = 1.0  # reprojection error above which a sheet is not flat in all frames
@@ -47,8 +47,7 @@ class RestShape:
     @property
     def flat(self) -> bool:
         """Whether the shape is a sheet: hardly any relief for its size."""
-        extent = np.linalg.svd(self.motion.shape, compute_uv=False)
-        return bool(extent[2] < FLAT_RELIEF * extent[0])
+        return is_flat(self.motion.shape)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Levenberg-Marquardt over a sliding window of frames (paper §5), with block tridiagonal normal equations."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.linalg import LinAlgError
 from scipy.linalg.lapack import dpbsv
 
 from reconstruction.energy import Energy, Normal, evaluate, linearise
+from reconstruction.past import Past
 from reconstruction.state import State
 from reconstruction.statistics import Statistics
 
@@ -43,10 +44,10 @@ class Solution:
     steps: int
 
 
-def minimise(energy: Energy, data: Statistics, start: State, before: State | None, solver: Solver) -> Solution:
+def minimise(energy: Energy, data: Statistics, start: State, before: Past | None, solver: Solver) -> Solution:
     """Minimise the energy of a window from `start`; `before` is the frame that has left it."""
     state, damping, steps = energy.completed(start), solver.damping, 0
-    before = before and energy.completed(before)
+    before = before and replace(before, state=energy.completed(before.state))
     normal = linearise(energy, data, state, before)
     while steps < solver.iterations:
         steps += 1

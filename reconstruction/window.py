@@ -14,9 +14,10 @@ from reconstruction.camera import (
     quaternion_product,
     rotation_from_quaternion,
 )
-from reconstruction.energy import Energy
+from reconstruction.energy import Energy, change_of, data_normal
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.outliers import LEAST_SIGMA, off_the_common_motion
+from reconstruction.past import Past, carried, known
 from reconstruction.refinement import Refinement
 from reconstruction.rigid import RigidMotion, pose_energy
 from reconstruction.sheet import tilt_axes
@@ -78,7 +79,7 @@ class SlidingWindow:
         self.spent = 0.0
         self._energy, *self._shown = *guides, energy
         self._length, self._motion = length, motion
-        self._before: State | None = None  # the frame that has left the window
+        self._before: Past | None = None  # the frame that has left the window
         self._lost: State | None = None  # the last frame before everything started anew
         self._data: list[Statistics] = []
         self._usual = np.inf  # energy of a new frame, running mean
@@ -135,10 +136,17 @@ class SlidingWindow:
         return self.model.projection(extrapolated(self.state[-2:-1], last) if len(self.state) > 1 else last).T
 
     def _without_oldest(self, window: State) -> State:
-        """The window without its oldest frame, about the rest shape that this frame refines."""
-        self._before, data = window[:1], self._data.pop(0)
+        """The window without its oldest frame: held by what that leaves behind, about the rest shape that it refines."""
+        oldest, seen = window[:1], data_normal(self._data.pop(0), window[:1])
+        hold = None
+        if np.isfinite(self._energy.jump):
+            information = known(seen.diagonal[0], self._energy.rows)
+            if self._before is not None and self._before.hold is not None:
+                information = information + self._before.hold
+            hold = carried(information, change_of(self._energy, oldest, window[1:2])[2][0])
+        self._before = Past(oldest, hold)
         if self._refine:
-            self._rest.take(data, self._before)
+            self._rest.take(seen)
             self._energy = self._energy.about(self._rest.rest)
             self._shown = [energy.about(self._rest.rest) for energy in self._shown]
         return window[1:]
@@ -169,7 +177,7 @@ class SlidingWindow:
 
     def _newest(self, energy: Energy, window: State, solver: Solver = ADJUSTING) -> Solution:
         """The newest frame adjusted alone, which takes a fraction of the whole window's time."""
-        before = window[-2:-1] if len(window) > 1 else self._before
+        before = Past(window[-2:-1]) if len(window) > 1 else self._before
         return minimise(energy, self._data[-1], window[-1:], before, solver)
 
     def _leant(self, last: State) -> State:

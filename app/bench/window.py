@@ -8,6 +8,7 @@ import numpy as np
 from app.bench.problems import WindowStep, full_model, summed, window_step
 from app.bench.timing import growth, least_s
 from app.errors import UsageError
+from reconstruction.past import Past
 from reconstruction.solver import Solution, Solver, minimise
 from reconstruction.statistics import stack
 
@@ -77,7 +78,7 @@ def timings(*, quick: bool, say: Say) -> list[Timing]:
 def iterations(step: WindowStep) -> Callable[[], Solution]:
     """Four iterations of a step whose points are summed up."""
     data = stack([step.settled, summed(step.B, step.W[-1], step.focal)])
-    return lambda: minimise(step.energy, data, step.start, step.before, Solver(iterations=ITERATIONS, tolerance=0.0))
+    return lambda: minimise(step.energy, data, step.start, Past(step.before), Solver(iterations=ITERATIONS, tolerance=0.0))
 
 
 def timed(step: WindowStep, deformation: str, iterations_s: float) -> Timing:
@@ -102,7 +103,7 @@ def timed(step: WindowStep, deformation: str, iterations_s: float) -> Timing:
 def solved(step: WindowStep, solver: Solver) -> Solution:
     """What a run does for a new frame."""
     data = stack([step.settled, summed(step.B, step.W[-1], step.focal)])
-    return minimise(step.energy, data, step.start, step.before, solver)
+    return minimise(step.energy, data, step.start, Past(step.before), solver)
 
 
 def races(*, quick: bool, say: Say) -> Iterator[Race]:

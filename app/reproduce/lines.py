@@ -5,7 +5,7 @@ from pathlib import Path
 
 from app.config import Evaluate
 from app.config_model import Model
-from reconstruction.modes import Metric
+from reconstruction.distances import MetricChoice
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Line:
     rest_shape: str
     deformation: str
     modes: int = 20
-    metric: Metric = Model.metric
+    metric: MetricChoice = Model.metric
     bootstrap_frames: int | None = None
     missing: float = 0.0
 

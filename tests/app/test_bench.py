@@ -20,6 +20,7 @@ from app.config_bench import Bench
 from app.errors import UsageError
 from reconstruction.camera import quaternion_exp
 from reconstruction.energy import evaluate
+from reconstruction.past import Past
 from reconstruction.solver import Solver
 from reconstruction.statistics import stack
 
@@ -41,7 +42,7 @@ def test_scipy_minimises_the_energy_of_the_solver(deformation: str) -> None:
     data = stack([step.settled, summed(step.B, step.W[-1], step.focal)])
     scipy = ScipyWindow(step)
     x = np.concatenate([np.zeros((problems.WINDOW, 3)), parameters(step.start, step.energy.rows)[:, 4:]], axis=1).ravel()
-    ours = evaluate(step.energy, data, step.start, step.before).sum()
+    ours = evaluate(step.energy, data, step.start, Past(step.before)).sum()
     assert (scipy.residuals(x) ** 2).sum() == pytest.approx(ours, rel=1e-9)
     end = window.solved(step, Solver(iterations=100, tolerance=1e-12)).value.sum()
     assert scipy.solve(1e-12) == pytest.approx(end, rel=1e-6)

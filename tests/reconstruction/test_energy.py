@@ -19,6 +19,7 @@ from reconstruction.energy import (
     smoothness,
 )
 from reconstruction.model import Model
+from reconstruction.past import Past
 from reconstruction.state import POSE, State, join
 from reconstruction.statistics import Statistics
 from tests.reconstruction.world import (
@@ -46,7 +47,7 @@ class Scene:
     weights: np.ndarray
     data: Statistics
     state: State
-    before: State
+    before: Past
 
 
 def scene_of(rng: np.random.Generator, camera=ORTHOGRAPHIC) -> Scene:  # type: ignore[no-untyped-def]
@@ -54,7 +55,13 @@ def scene_of(rng: np.random.Generator, camera=ORTHOGRAPHIC) -> Scene:  # type: i
     W = 80 * rng.normal(size=(FRAMES, 2, POINTS)) + camera.center_px[:, None]
     weights = np.where(rng.random((FRAMES, POINTS)) < 0.7, rng.random((FRAMES, POINTS)), 0.0)
     chain = random_state(rng, FRAMES + 1, MODES)
-    return Scene(model, W, weights, statistics_of(model, W, weights), chain[1:], chain[:1])
+    return Scene(model, W, weights, statistics_of(model, W, weights), chain[1:], Past(chain[:1]))
+
+
+def held(scene: Scene, rng: np.random.Generator, rows: tuple[int, ...]) -> Scene:
+    """The same with what is known of the rows of Λ from the frames before."""
+    root = rng.normal(size=2 * [len(rows) * MODES])
+    return replace(scene, before=replace(scene.before, hold=root @ root.T))
 
 
 def nothing_seen(scene: Scene) -> Statistics:
@@ -69,7 +76,8 @@ def terms(scene: Scene) -> dict[str, Energy]:
         "rotation": replace(SILENT, rotation=0.7),
         "translation": replace(SILENT, translation=0.4),
         "scale": replace(SILENT, scale=0.6),
-        "smoothness": replace(SILENT, smoothness=0.3),
+        "smoothness": replace(SILENT, smoothness=np.array([0.2, 0.3, 0.6])),
+        "jumps": replace(SILENT, smoothness=np.array([0.2, 0.3, 0.6]), jump=0.05),
         "rest": replace(SILENT, rest=0.9),
         "inextensibility": replace(SILENT, inextensibility=2.0, edges=edges),
     }
@@ -117,15 +125,17 @@ def check_gradient(energy: Energy, data: Statistics, scene: Scene, rng: np.rando
 
 
 def replace_states(scene: Scene, state: State) -> Scene:
-    before = replace(scene.before, Lambda=np.zeros((1, 3, state.Lambda.shape[2])))
-    return replace(scene, state=state, before=before)
+    before = replace(scene.before.state, Lambda=np.zeros((1, 3, state.Lambda.shape[2])))
+    return replace(scene, state=state, before=Past(before))
 
 
-@pytest.mark.parametrize("term", ["rotation", "translation", "scale", "smoothness", "rest", "inextensibility"])
+@pytest.mark.parametrize("term", ["rotation", "translation", "scale", "smoothness", "jumps", "rest", "inextensibility"])
 @settings(max_examples=10)
-@given(rng=SEEDS, tied=st.booleans())
-def test_gradient_of_each_prior(term: str, rng: np.random.Generator, tied: bool) -> None:
+@given(rng=SEEDS, tied=st.booleans(), known=st.booleans())
+def test_gradient_of_each_prior(term: str, rng: np.random.Generator, tied: bool, known: bool) -> None:
     scene = scene_of(rng)
+    if known:
+        scene = held(scene, rng, (0, 1, 2))
     energy = replace(terms(scene)[term], tied=tied)
     data = nothing_seen(scene)
     assert evaluate(energy, data, scene.state, scene.before).sum() > 0
@@ -181,13 +191,15 @@ def residuals(energy: Energy, scene: Scene, state: State) -> np.ndarray:
         d = energy.edges.rest + Lambda @ energy.edges.modes
         length = energy.edges.length
         parts.append(np.sqrt(energy.inextensibility / len(length)) * ((d**2).sum(axis=0) - length**2) / (2 * length))
-    chain = join([scene.before, state]) if energy.tied else state
+    chain = join([scene.before.state, state]) if energy.tied else state
     for a, b in zip(range(len(chain) - 1), range(1, len(chain)), strict=True):
         sign = 1.0 if chain.q[a] @ chain.q[b] > 0 else -1.0
         parts.append(np.sqrt(energy.rotation) * (chain.q[b] - sign * chain.q[a]))
         parts.append(np.sqrt(energy.translation) * (chain.t[b] - chain.t[a]))
         parts.append(np.sqrt(energy.scale) * (chain.log_s[b] - chain.log_s[a]))
-        parts.append(np.sqrt(energy.smoothness) * (chain.Lambda[b] - chain.Lambda[a])[energy.rows, :])
+        change = (chain.Lambda[b] - chain.Lambda[a])[energy.rows, :]
+        hold = scene.before.hold if energy.tied and a == 0 else None
+        parts.append(np.sqrt(energy.smoothness) * change if hold is None else np.linalg.cholesky(hold).T @ change.ravel())
     return np.concatenate([np.ravel(part) for part in parts])
 
 
@@ -207,9 +219,11 @@ def dense(diagonal: np.ndarray, coupling: np.ndarray) -> np.ndarray:
 
 
 @settings(max_examples=20)
-@given(rng=SEEDS, camera=CAMERAS, rows=st.sampled_from([(0, 1, 2), (2,), (0, 1)]), tied=st.booleans())
-def test_blocks_are_those_of_the_residuals(rng, camera, rows, tied) -> None:  # type: ignore[no-untyped-def]
+@given(rng=SEEDS, camera=CAMERAS, rows=st.sampled_from([(0, 1, 2), (2,), (0, 1)]), tied=st.booleans(), known=st.booleans())
+def test_blocks_are_those_of_the_residuals(rng, camera, rows, tied, known) -> None:  # type: ignore[no-untyped-def]
     scene = scene_of(rng, camera)
+    if known:
+        scene = held(scene, rng, rows)
     energy = everything(scene, rows, tied=tied)
     normal = linearise(energy, scene.data, scene.state, scene.before)
     n, d = normal.gradient.shape
@@ -240,7 +254,7 @@ def test_fixed_scale_is_left_alone() -> None:
 def test_an_untied_window_floats() -> None:
     scene = scene_of(np.random.default_rng(6))
     tied = everything(scene, (0, 1, 2), tied=True)
-    elsewhere = replace(scene.before, t=scene.before.t + 9.0)
+    elsewhere = Past(replace(scene.before.state, t=scene.before.state.t + 9.0))
     values = [evaluate(tied, scene.data, scene.state, b)[0] for b in (scene.before, elsewhere)]
     assert values[1] > values[0] + 1
     floating = replace(tied, tied=False)

@@ -7,6 +7,7 @@ import pytest
 
 from reconstruction import rest_shape
 from reconstruction.camera import Camera
+from reconstruction.energy import data_normal
 from reconstruction.evaluation import e3d
 from reconstruction.model import ShapeEstimate
 from reconstruction.online import Reconstruction, Settings
@@ -100,7 +101,7 @@ def test_a_rest_elsewhere_is_found_but_not_from_few_frames(camera: Camera) -> No
     data, states, rest = observed(camera, 60)
     refinement, gaps = Refinement(4), []
     for one, state in zip(data, states, strict=True):
-        refinement.take(one, replace(state, Lambda=refinement.rest[None].copy()))
+        refinement.take(data_normal(one, replace(state, Lambda=refinement.rest[None].copy())))
         gaps.append(np.linalg.norm(refinement.rest - rest) / np.linalg.norm(rest))
     assert gaps[FEWEST - 2] == pytest.approx(1.0)
     assert gaps[FEWEST - 1] < 0.8
@@ -111,10 +112,10 @@ def test_frames_without_points_say_nothing_and_what_is_known_fades() -> None:
     data, states, rest = observed(ORTHOGRAPHIC, 30)
     refinement = Refinement(4)
     for one, state in zip(data, states, strict=True):
-        refinement.take(one, replace(state, Lambda=refinement.rest[None].copy()))
+        refinement.take(data_normal(one, replace(state, Lambda=refinement.rest[None].copy())))
     found = np.linalg.norm(refinement.rest)
     nothing = Statistics(0 * data[0].gram, 0 * data[0].cross, 0 * data[0].power)
     for _ in range(1000):
-        refinement.take(nothing, replace(states[0], Lambda=refinement.rest[None].copy()))
+        refinement.take(data_normal(nothing, replace(states[0], Lambda=refinement.rest[None].copy())))
     assert found > 0.7 * np.linalg.norm(rest)
     assert np.linalg.norm(refinement.rest) < 1e-3 * found
