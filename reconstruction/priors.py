@@ -41,12 +41,12 @@ PRIORS: dict[str, Prior] = {
         "λ_0 Σ_k ω_k ‖Λ'_k − Λ̄'_k‖², ω_k ∝ eigenvalue_k^(−½)",
         "Pulls to the rest shape, weak modes harder. Without it, modes 1 and 2 do what tilt and scale should. More where "
         "points are few or noisy, less where the surface deforms far.",
-        {"bending": 5e-3, "inextensible": 3e-4, OTHERWISE: 1e-2},
+        {"bending": 5e-3, "inextensible": 3e-4, OTHERWISE: 8e-3},
     ),
     "smoothness": Prior(
         "λ_γ Σ_k ω_k ‖ΔΛ'_k‖²; where a surface may do anything, λ_γ σ² log(1 + Σ_k ω_k ‖ΔΛ'_k‖²/σ²), σ = 0.3 %",
         "The deformation changes slowly. More for noisy or missing points and high frame rates, less for fast motion.",
-        {"bending": 1e-3, "inextensible": 1e-4, OTHERWISE: 6.0},
+        {"bending": 1e-3, "inextensible": 1e-4, OTHERWISE: 5.0},
     ),
     "rotation": Prior(
         "λ_q ‖Δq‖²",

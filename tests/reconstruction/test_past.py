@@ -61,7 +61,7 @@ def test_a_deformation_that_lasts_gets_its_depth_as_the_object_turns() -> None:
     model = model_of(rest, ORTHOGRAPHIC, 20)
     energy = build_energy(model, "general")
     errors = []
-    for one in (energy, replace(energy, jump=np.inf, smoothness=0.1 * energy.smoothness / 6.0)):
+    for one in (energy, replace(energy, jump=np.inf, smoothness=0.1 * energy.smoothness / 5.0)):
         window = SlidingWindow(model, one, 3, rest_shape.given(rest, "truth", "").motion)
         found = [window.advance(w, np.ones(60, bool)) for w in W]
         errors.append(e3d(np.stack([f.shape for f in found]), truth))
