@@ -61,7 +61,7 @@ class Recorder:
         self._process: subprocess.Popen[bytes] | None = None
         if path or connect or view:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "app.recorder"],
+                [sys.executable, "-P", "-m", "app.recorder"],  # -P: a user's folder may have modules of the same names
                 env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,

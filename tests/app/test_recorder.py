@@ -61,6 +61,16 @@ def test_pictures_that_are_not_stored_are_not_sent(tmp_path: Path, run: Run) -> 
     assert all(image is None for _, image in playback.images())
 
 
+def test_modules_that_lie_about_are_not_imported(tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("numpy", "org"):  # one that is needed, one that a library looks for
+        (tmp_path / f"{name}.py").write_text("print('this is not the module that was meant')")
+    monkeypatch.chdir(tmp_path)
+    recording = Recorder(tmp_path / "run.rrd", configuration={}, size=SIZE)
+    tell(recording, run)
+    recording.close()
+    assert Playback.load(tmp_path / "run.rrd").shaped.sum() == 40
+
+
 def test_what_nobody_reads_needs_no_process(run: Run) -> None:
     recording = Recorder(None, configuration={}, size=SIZE)
     assert recording._process is None
