@@ -13,6 +13,7 @@ Weights = dict[str, float]
 
 ORTHOGRAPHIC_SCALE = 1.0  # λ_s without depth, where only a zoom changes the scale
 PERSPECTIVE_SCALE = 1e-3  # λ_s with depth, where moving towards the camera does
+SWELLING_SCALE = 1e-2  # λ_s with depth where the object may swell, too, which looks alike
 OTHERWISE = "otherwise"
 STILL = 3e-3  # σ: change between frames, of the shape's size, up to which a surface holds still
 
@@ -24,7 +25,7 @@ class Prior:
     Attributes:
         formula: the term; Δ is the change since the frame before.
         use: what it is for, and when to change its weight.
-        default: weight by deformation, or by camera (perspective, orthographic), or otherwise.
+        default: weight by deformation and camera (perspective, orthographic), or by one of them, or otherwise.
     """
 
     formula: str
@@ -33,7 +34,8 @@ class Prior:
 
     def weight(self, deformation: str, camera: str) -> float:
         """The weight unless somebody chooses another."""
-        return next(self.default[case] for case in (deformation, camera, OTHERWISE) if case in self.default)
+        cases = (f"{deformation} {camera}", deformation, camera, OTHERWISE)
+        return next(self.default[case] for case in cases if case in self.default)
 
 
 PRIORS: dict[str, Prior] = {
@@ -62,7 +64,7 @@ PRIORS: dict[str, Prior] = {
         "λ_s (Δ log s)²",
         "The object stays as far away. Less for an orthographic camera that zooms, more for a perspective one before which "
         "the object only turns. Of no effect with `--energy paper`, where s = 1.",
-        {"orthographic": ORTHOGRAPHIC_SCALE, "perspective": PERSPECTIVE_SCALE},
+        {"general perspective": SWELLING_SCALE, "orthographic": ORTHOGRAPHIC_SCALE, "perspective": PERSPECTIVE_SCALE},
     ),
     "inextensibility": Prior(
         "κ mean_e ρ_e², ρ_e = (‖d_e‖² − l_e²) / (2 l_e)",

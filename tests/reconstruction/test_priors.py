@@ -33,7 +33,7 @@ def estimates(chosen: Weights, camera: Camera = PERSPECTIVE) -> list[ShapeEstima
     [
         ("bending", False, False, 5e-3, 1e-3, 3e-4, 1.0, 0.0),
         ("stretching", False, False, 8e-3, 5.0, 3e-4, 1.0, 0.0),
-        ("general", True, False, 8e-3, 5.0, 1e-4, 1e-3, 0.0),
+        ("general", True, False, 8e-3, 5.0, 1e-4, 1e-2, 0.0),
         ("inextensible", True, False, 3e-4, 1e-4, 3e-4, 1e-3, 1.0),
         ("inextensible", False, True, 0.0, 1e-3, 3e-4, 1.0, 0.0),
         ("bending", False, True, 0.0, 1e-3, 3e-4, 1.0, 0.0),
