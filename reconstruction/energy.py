@@ -100,9 +100,10 @@ def evaluate(energy: Energy, data: Statistics, state: State, before: Past | None
     if energy.edges is not None:
         strain = energy.edges.strain(energy.edges.vectors(state.Lambda))
         value += energy.inextensibility * (strain**2).mean(axis=1)
-    value[1:] += smoothness(energy, state[:-1], state[1:])
-    if energy.tied and before is not None:
-        value[:1] += smoothness(energy, before.state, state[:1], before.hold)
+    past = before if energy.tied else None
+    chain = state if past is None else join([past.state, state])
+    if len(chain) > 1:
+        value[len(state) - len(chain) + 1 :] += smoothness(energy, chain[:-1], chain[1:], past.hold if past else None)
     return np.asarray(value)
 
 
@@ -203,14 +204,16 @@ def add_inextensibility(normal: Normal, free_rows: tuple[int, ...], kappa: float
 def smoothness(energy: Energy, earlier: State, later: State, hold: Array | None = None) -> Array:
     """Change (n,) between frames and their successors: λ_q‖Δq‖² + λ_t‖Δt‖² + λ_s(Δ log s)² + that of Λ', see `change_of`.
 
-    With `hold` the latter is ΔΛ'ᵀ H ΔΛ'.
+    With `hold` the latter is ΔΛ'ᵀ H ΔΛ' for the first of them.
     """
     change, cost, _ = change_of(energy, earlier, later)
+    if hold is not None:
+        cost[0] = change[0] @ hold @ change[0]
     return np.asarray(
         energy.rotation * (quaternion_difference(earlier.q, later.q) ** 2).sum(axis=1)
         + energy.translation * ((later.t - earlier.t) ** 2).sum(axis=1)
         + energy.scale * (later.log_s - earlier.log_s) ** 2
-        + (cost if hold is None else ((change @ hold) * change).sum(axis=1))
+        + cost
     )
 
 
@@ -221,11 +224,10 @@ def change_of(energy: Energy, earlier: State, later: State) -> tuple[Array, Arra
     holds still is held, what moves is let go.
     """
     change = (later.Lambda - earlier.Lambda)[:, energy.rows, :]
-    n, rows, r = change.shape
-    weights = np.broadcast_to(energy.smoothness, change.shape).reshape(n, rows * r)
-    change = change.reshape(n, rows * r)
+    weights = energy.smoothness * np.ones(change.shape[1:])
+    change, weights = change.reshape(len(change), weights.size), weights.reshape(1, weights.size)
     cost = (weights * change**2).sum(axis=1)
-    if np.isfinite(energy.jump):
+    if energy.jump < np.inf:
         weights = weights / (1 + cost / energy.jump)[:, None]
         cost = energy.jump * np.log1p(cost / energy.jump)
     return change, cost, weights
