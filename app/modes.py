@@ -15,7 +15,7 @@ from app.results import check_free, writable
 from reconstruction import distances
 from reconstruction.distances import Metric, MetricChoice, fitting
 from reconstruction.mesh import Mesh
-from reconstruction.modes import EXACT_POINTS, ModalBasis, doubly_centred, is_flat
+from reconstruction.modes import ModalBasis, doubly_centred, exact_points, is_flat
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ def modes(command: Modes, progress: Progress) -> Words:
     }
 
 
-def of_recording(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, str]:
+def of_recording(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, Metric]:
     """Name, modes, mesh and metric of a recording."""
     from app.playback import Playback
 
@@ -59,7 +59,7 @@ def of_recording(command: Modes, progress: Progress) -> tuple[str, ModalBasis, M
     return playback.name, playback.basis, playback.mesh, fitting(asked, flat=is_flat(playback.basis.rest))
 
 
-def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, str]:
+def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, Metric]:
     """The same of tracks: their first frames are reconstructed until there is a rest shape."""
     from app.evaluate import prepare
     from tracking.tracks import Tracks
@@ -80,11 +80,11 @@ def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh
     return Path(command.source).stem, reconstruction.model.basis, reconstruction.model.mesh, reconstruction.metric
 
 
-def spectrum(basis: ModalBasis, mesh: Mesh, metric: str) -> Array:
+def spectrum(basis: ModalBasis, mesh: Mesh, metric: Metric) -> Array:
     """All eigenvalues (p,) of −½CDC, descending; of many points those of the basis, since D would not fit in memory."""
-    if basis.rest.shape[1] > EXACT_POINTS:
+    if basis.rest.shape[1] > exact_points(metric):
         return basis.eigenvalues
-    D = distances.dissimilarity(cast(Metric, metric), basis.rest, mesh.edges)
+    D = distances.dissimilarity(metric, basis.rest, mesh.edges)
     return np.asarray(np.linalg.eigvalsh(doubly_centred(D))[::-1], np.float64)
 
 

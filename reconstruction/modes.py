@@ -15,6 +15,7 @@ Metric = distances.Metric
 
 FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
 EXACT_POINTS = 4000  # with more, modes come from the distances to landmarks: all of D would take minutes and gigabytes
+DEAR_POINTS = 1000  # the same for Jensen-Shannon distances, which take ten times as long
 
 
 @dataclass(frozen=True)
@@ -53,13 +54,18 @@ def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean
     if not 1 <= modes < p:
         raise ReconstructionError(f"--modes {modes} does not fit {p} points: choose 1 to {p - 1}")
     rest = rest - rest.mean(axis=1, keepdims=True)
-    if p > EXACT_POINTS:
+    if p > exact_points(metric):
         eigenvalues, vectors = landmarks.leading_eigenpairs(rest, mesh.edges, modes, metric)
         Upsilon = with_fixed_signs(vectors).T
     else:
         D = distances.dissimilarity(metric, rest, mesh.edges)
         eigenvalues, Upsilon = leading_eigenpairs(doubly_centred(D), modes)
     return ModalBasis(rest, Upsilon, eigenvalues, principal_axes(rest))
+
+
+def exact_points(metric: Metric) -> int:
+    """Most points whose distances are all computed."""
+    return DEAR_POINTS if metric == "jensen-shannon" else EXACT_POINTS
 
 
 def doubly_centred(D: Array) -> Array:

@@ -11,7 +11,7 @@ from app.reproduce.organ import organ
 from app.reproduce.result import Result, Table
 from app.reproduce.work import Effort, Work
 from reconstruction.mesh import Mesh, triangulate
-from reconstruction.modes import modal_basis
+from reconstruction.modes import Metric, modal_basis
 from tracking.tracks import Tracks
 
 DRAWN = 5
@@ -38,7 +38,7 @@ def mode_shapes(work: Work) -> Result:
     return Result([shares_table(flag, flag_mesh)], figures, pictures)
 
 
-def all_eigenvalues(rest: np.ndarray, mesh: Mesh, metric: str) -> np.ndarray:
+def all_eigenvalues(rest: np.ndarray, mesh: Mesh, metric: Metric) -> np.ndarray:
     """(p,) descending."""
     return spectrum(modal_basis(rest, mesh, 1), mesh, metric)
 

@@ -81,7 +81,7 @@ def test_tracks_show_the_modes_of_their_rest_shape(tmp_path: Path, tracks: Path)
     for kind in ("first-truth", "rigid"):
         command = Modes(tracks, out=tmp_path / f"{kind}.png", rest_shape=kind, model=Model(modes=6))
         found[kind] = modes(command, Progress())["eigenvalues"]
-    expected = modal_basis(truth[0], triangulate(truth[0, :2].T), 6, "chi-squared").eigenvalues
+    expected = modal_basis(truth[0], triangulate(truth[0, :2].T), 6, "jensen-shannon").eigenvalues
     assert found["first-truth"] == pytest.approx(expected)
     assert found["rigid"] == pytest.approx(expected, rel=0.02)
 
@@ -111,7 +111,7 @@ def test_the_spectrum_begins_with_the_modes(run: Run, metric: str) -> None:
 
 
 def test_of_many_points_the_spectrum_is_that_of_the_modes(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.modes.EXACT_POINTS", len(run.pixels) - 1)
+    monkeypatch.setattr("reconstruction.modes.EXACT_POINTS", len(run.pixels) - 1)
     np.testing.assert_array_equal(spectrum(run.basis, run.mesh, "euclidean"), run.basis.eigenvalues)
 
 

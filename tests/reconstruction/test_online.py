@@ -89,7 +89,7 @@ def test_a_bending_sheet_is_followed(deformation: Deformation, share: float) -> 
 def test_auto_takes_a_sheet_for_inextensible() -> None:
     W, truth = bending_sheet()
     reconstruction, estimates = reconstruct(W, truth=truth)
-    assert reconstruction.deformation == "inextensible"
+    assert (reconstruction.deformation, reconstruction.metric) == ("inextensible", "chi-squared")
     assert error(estimates, truth) < 0.5 * static_error(reconstruction, truth)
 
 
@@ -112,7 +112,7 @@ def test_a_solid_is_factorised_then_deformed() -> None:
     assert reconstruction.rest is not None
     assert reconstruction.rest.kind == "rigid"
     assert reconstruction.bootstrap_frames == 12
-    assert reconstruction.deformation == "general"
+    assert (reconstruction.deformation, reconstruction.metric) == ("general", "jensen-shannon")
     assert [e.frame for e in estimates] == list(range(FRAMES))
     per_frame = e3d(shapes_of(estimates), truth)
     still = e3d(np.broadcast_to(reconstruction.rest.motion.shape, truth.shape), truth)
