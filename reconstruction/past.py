@@ -13,7 +13,7 @@ from reconstruction.state import POSE, State
 
 Array = NDArray[np.float64]
 
-LOOSE = 1e-9  # of a pose's stiffness, where the image leaves some of it open
+LOOSE = 1e-9  # stiffness of a pose where the image leaves some of it open: too few points, or none
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ def known(hessian: Array, rows: tuple[int, ...]) -> Array:
     """What one image says about the given rows of Λ' whatever the pose, (k, k), from its data term's (6 + 3r, 6 + 3r)."""
     pose, deformation = np.arange(POSE), POSE + np.arange(len(hessian) - POSE).reshape(3, -1)[list(rows)].ravel()
     posed = hessian[np.ix_(pose, pose)]
-    posed = posed + LOOSE * np.trace(posed) * np.eye(POSE)
+    posed = posed + LOOSE * (1 + np.trace(posed)) * np.eye(POSE)
     mixed = hessian[np.ix_(pose, deformation)]
     return np.asarray(hessian[np.ix_(deformation, deformation)] - mixed.T @ np.linalg.solve(posed, mixed))
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 
 from reconstruction import rest_shape
@@ -43,6 +44,16 @@ def test_carried_is_the_least_that_a_change_costs(rng: np.random.Generator) -> N
     earlier = np.linalg.solve(information + np.diag(link), link * later)
     least = earlier @ information @ earlier + link @ (later - earlier) ** 2
     np.testing.assert_allclose(later @ carried(information, link) @ later, least, rtol=1e-9)
+
+
+@pytest.mark.parametrize("left", [0, 2])
+def test_frames_in_which_next_to_nothing_is_seen_are_survived(left: int) -> None:
+    rest = relief(np.random.default_rng(3), 60)
+    W, truth = seen(np.broadcast_to(rest, (20, 3, 60)), turns(20), ORTHOGRAPHIC)
+    model = model_of(rest, ORTHOGRAPHIC, 10)
+    window = SlidingWindow(model, build_energy(model, "general"), 3, rest_shape.given(rest, "truth", "").motion)
+    found = [window.advance(w, (np.arange(60) < left) | (f not in (8, 12, 13))) for f, w in enumerate(W)]
+    assert e3d(np.stack([one.shape for one in found]), truth).max() < 0.01
 
 
 def test_what_is_not_known_is_not_held() -> None:
