@@ -218,7 +218,7 @@ def smoothness(energy: Energy, earlier: State, later: State, hold: Array | None 
 
 
 def change_of(energy: Energy, earlier: State, later: State) -> tuple[Array, Array, Array]:
-    """Change ΔΛ' (n, k) of the free rows from frames to their successors, its cost (n,), weights (n or 1, k) on its squares.
+    """Change ΔΛ' (n, k) of the free rows between successive frames, its cost (n,), weights on its squares (n or 1, k).
 
     The cost is λ_γ‖ΔΛ'‖²; with jumps, of size j, it is j log(1 + λ_γ‖ΔΛ'‖²/j), as of a heavy-tailed distribution: what
     holds still is held, what moves is let go.
