@@ -15,6 +15,8 @@ ORTHOGRAPHIC_SCALE = 1.0  # λ_s without depth, where only a zoom changes the sc
 PERSPECTIVE_SCALE = 1e-3  # λ_s with depth, where moving towards the camera does
 SWELLING_SCALE = 1e-2  # λ_s with depth where the object may swell, too, which looks alike
 OTHERWISE = "otherwise"
+FITTING = 1e-2  # misfit, of the shape's size, above which a model that may do anything is pulled to rest harder, ...
+FIRMEST = 3.0  # ... up to so many times
 STILL = 3e-3  # σ: change between frames, of the shape's size, up to which a surface holds still
 
 
@@ -40,9 +42,10 @@ class Prior:
 
 PRIORS: dict[str, Prior] = {
     "rest": Prior(
-        "λ_0 Σ_k ω_k ‖Λ'_k − Λ̄'_k‖², ω_k ∝ eigenvalue_k^(−½)",
-        "Pulls to the rest shape, weak modes harder. Without it, modes 1 and 2 do what tilt and scale should. More where "
-        "points are few or noisy, less where the surface deforms far.",
+        "λ_0 Σ_k ω_k ‖Λ'_k − Λ̄'_k‖², ω_k ∝ eigenvalue_k^(−½); where a surface may do anything, times the mean squared "
+        "misfit so far over (1 %)², between 1 and 3",
+        "Pulls to the rest shape, weak modes harder, and harder where noise or too few modes leave much over. Without it, "
+        "modes 1 and 2 do what tilt and scale should. More where points are few or noisy, less where the surface deforms far.",
         {"bending": 5e-3, "inextensible": 3e-4, OTHERWISE: 8e-3},
     ),
     "smoothness": Prior(

@@ -37,6 +37,11 @@ class Statistics:
     def __len__(self) -> int:
         return len(self.power)
 
+    @property
+    def seen(self) -> float:
+        """Share of the points that is seen in the first frame, by their weights."""
+        return float(self.gram[0, 0, -1, -1])
+
     @cached_property
     def form(self) -> Array:
         """(n, 3K, 3K) matrix of the quadratic form in M, row after row."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from reconstruction import statistics
 from reconstruction.ambiguity import Switch, switch_between
 from reconstruction.camera import (
     CONJUGATE,
@@ -18,6 +19,7 @@ from reconstruction.energy import Energy, change_of, data_normal
 from reconstruction.model import Model, ShapeEstimate
 from reconstruction.outliers import LEAST_SIGMA, off_the_common_motion
 from reconstruction.past import Past, carried, known
+from reconstruction.priors import FIRMEST, FITTING
 from reconstruction.refinement import Refinement
 from reconstruction.rigid import RigidMotion, pose_energy
 from reconstruction.sheet import tilt_axes
@@ -79,6 +81,8 @@ class SlidingWindow:
         self.spent = 0.0
         self._energy, *self._shown = *guides, energy
         self._length, self._motion = length, motion
+        self._pull = self._energy.rest
+        self._misfit = np.nan  # mean squared, of frames so far
         self._before: Past | None = None  # the frame that has left the window
         self._lost: State | None = None  # the last frame before everything started anew
         self._data: list[Statistics] = []
@@ -120,6 +124,8 @@ class SlidingWindow:
         else:
             self._usual = 0.9 * self._usual + 0.1 * newest
         self.state = found.state
+        if np.isfinite(self._energy.jump):
+            self._weigh_rest(self.state[-1:])
         return replace(self.model.estimate(self._frame, W, visible, self._settled()), switch=self._switch)
 
     def restart(self) -> None:
@@ -150,6 +156,14 @@ class SlidingWindow:
             self._energy = self._energy.about(self._rest.rest)
             self._shown = [energy.about(self._rest.rest) for energy in self._shown]
         return window[1:]
+
+    def _weigh_rest(self, newest: State) -> None:
+        """Pull to rest by what the model leaves over: the noise, and what its modes cannot follow."""
+        data = self._data[-1]
+        misfit = float(statistics.value(data, newest.matrices())[0]) / max(data.seen, 1e-9)
+        self._misfit = misfit if np.isnan(self._misfit) else 0.9 * self._misfit + 0.1 * misfit
+        firmer = np.clip(self._misfit / FITTING**2, 1.0, FIRMEST)
+        self._energy = replace(self._energy, rest=firmer * self._pull)
 
     def _adjust(self, start: State) -> Solution:
         return minimise(self._energy, stack(self._data), start, self._before, ADJUSTING)

@@ -11,6 +11,7 @@ from reconstruction.constraints import Deformation, build_energy
 from reconstruction.model import ShapeEstimate
 from reconstruction.online import Reconstruction, Settings
 from reconstruction.priors import PRIORS, Weights, table, weights
+from reconstruction.window import SlidingWindow
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, model_of, relief, seen, turns
 
 POINTS, FRAMES = 60, 12
@@ -115,6 +116,21 @@ def test_each_prior_holds_what_it_is_named_after() -> None:
     for name in ("rest", "rotation", "translation", "scale"):
         assert spread(name, 100.0) < 0.5 * spread(name, 0.0), name
     assert spread("smoothness", 100.0) < 0.7 * spread("smoothness", 0.0)  # new frames go on to improve one lasting shape
+
+
+@pytest.mark.parametrize(
+    ("noise_px", "deformation", "factor"), [(0.0, "general", 1), (6.0, "general", 3), (6.0, "inextensible", 1)]
+)
+def test_what_is_left_over_pulls_to_rest(noise_px: float, deformation: Deformation, factor: float) -> None:
+    rng = np.random.default_rng(0)
+    rest = relief(rng, POINTS)
+    model = model_of(rest, PERSPECTIVE, 5)
+    W, _ = seen(np.broadcast_to(rest, (FRAMES, 3, POINTS)), turns(FRAMES), PERSPECTIVE)
+    energy = build_energy(model, deformation)
+    window = SlidingWindow(model, energy, 3, rest_shape.given(rest, "truth", "").motion)
+    for w in W + rng.normal(0, noise_px, W.shape):
+        window.advance(w, np.ones(POINTS, bool))
+    np.testing.assert_allclose(window._energy.rest, factor * energy.rest)
 
 
 def test_the_document_lists_the_priors_as_they_are() -> None:
