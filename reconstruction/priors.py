@@ -45,7 +45,8 @@ PRIORS: dict[str, Prior] = {
         "λ_0 Σ_k ω_k ‖Λ'_k − Λ̄'_k‖², ω_k ∝ eigenvalue_k^(−½); where a surface may do anything, times the mean squared "
         "misfit so far over (1 %)², between 1 and 3",
         "Pulls to the rest shape, weak modes harder, and harder where noise or too few modes leave much over. Without it, "
-        "modes 1 and 2 do what tilt and scale should. More where points are few or noisy, less where the surface deforms far.",
+        "modes 1 and 2 do what tilt and scale should. More where points are few or noisy, less where the surface deforms "
+        "far.",
         {"bending": 5e-3, "inextensible": 3e-4, OTHERWISE: 8e-3},
     ),
     "smoothness": Prior(
