@@ -12,8 +12,7 @@ from app.config import Evaluate, Words
 from app.config_export import Modes
 from app.progress import Progress
 from app.results import check_free, writable
-from reconstruction import distances
-from reconstruction.distances import Metric, MetricChoice, fitting
+from reconstruction.distances import Metric, MetricChoice, dissimilarity, fitting
 from reconstruction.mesh import Mesh
 from reconstruction.modes import ModalBasis, doubly_centred, exact_points, is_flat
 
@@ -84,7 +83,7 @@ def spectrum(basis: ModalBasis, mesh: Mesh, metric: Metric) -> Array:
     """All eigenvalues (p,) of −½CDC, descending; of many points those of the basis, since D would not fit in memory."""
     if basis.rest.shape[1] > exact_points(metric):
         return basis.eigenvalues
-    D = distances.dissimilarity(metric, basis.rest, mesh.edges)
+    D = dissimilarity(metric, basis.rest, mesh.edges)
     return np.asarray(np.linalg.eigvalsh(doubly_centred(D))[::-1], np.float64)
 
 

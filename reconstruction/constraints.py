@@ -46,7 +46,7 @@ def build_energy(
     # A mode's eigenvalue says how much of the shape's extent it carries: weak modes are pulled to rest harder.
     stiffness = model.basis.eigenvalues**-0.5
     stiffness /= np.exp(np.log(stiffness).mean())
-    lets_go = deformation in ("general", "stretching") and not paper
+    lets_go = deformation in ("general", "stretching") and not paper and weights["smoothness"] > 0
     draws_in = deformation == "bending" and not (paper or linear)
     edges = model.coarse_edges() if draws_in or weights["inextensibility"] else None
     return Energy(
@@ -54,7 +54,7 @@ def build_energy(
         translation=weights["translation"],
         scale=weights["scale"],
         smoothness=weights["smoothness"] if paper else weights["smoothness"] * stiffness,
-        jump=weights["smoothness"] * priors.STILL**2 or np.inf if lets_go else np.inf,
+        jump=weights["smoothness"] * priors.STILL**2 if lets_go else np.inf,
         rest=weights["rest"] * stiffness,
         inextensibility=weights["inextensibility"],
         rows=ROWS[deformation],
