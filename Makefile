@@ -27,7 +27,7 @@ test-slow: .venv/ready
 
 test-opencv4: .venv-opencv4/ready
 	$(BIN4)/python -c 'import cv2; assert cv2.__version__.startswith("4."), cv2.__version__'
-	$(BIN4)/python $(PYTEST) tests/tracking tests/app/test_session.py tests/app/test_cli.py tests/app/test_errors.py
+	$(BIN4)/python $(PYTEST) tests/tracking tests/app/pipeline/test_session.py tests/app/commands/test_cli.py tests/app/commands/test_errors.py
 
 lint: .venv/ready
 	$(BIN)/ruff check .

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.artwork import premultiplied
-from app.compositing import Compositor
-from app.playback import Playback
+from app.painting.compositing import Compositor
+from app.painting.picture import premultiplied
+from app.playback.playback import Playback
 from tests.viewer.conftest import Viewer, headless_viewer
 from tests.viewer.screenshot import settled
 

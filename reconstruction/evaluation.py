@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError
+from reconstruction.basis.mesh import Mesh, locate
 from reconstruction.camera import nearest_rotation
-from reconstruction.mesh import Mesh, locate
 
 Array = NDArray[np.float64]
 

@@ -8,17 +8,19 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from reconstruction import ReconstructionError, focal, priors, rest_shape
+from reconstruction import ReconstructionError
+from reconstruction.basis.distances import Metric, MetricChoice, fitting
+from reconstruction.basis.mesh import Mesh
 from reconstruction.camera import Camera
-from reconstruction.constraints import Deformation, build_energy, build_guides, chosen
-from reconstruction.distances import Metric, MetricChoice, fitting
-from reconstruction.factorization import view_turn_degrees
-from reconstruction.mesh import Mesh
-from reconstruction.model import Model, ShapeEstimate, build_model
-from reconstruction.outliers import without_outliers
-from reconstruction.priors import Weights
-from reconstruction.rest_shape import TURN_DEGREES, RestShape
-from reconstruction.window import SlidingWindow
+from reconstruction.mapping import focal, rest_shape
+from reconstruction.mapping.factorization import view_turn_degrees
+from reconstruction.mapping.outliers import without_outliers
+from reconstruction.mapping.rest_shape import TURN_DEGREES, RestShape
+from reconstruction.window import priors
+from reconstruction.window.constraints import Deformation, build_energy, build_guides, chosen
+from reconstruction.window.model import Model, ShapeEstimate, build_model
+from reconstruction.window.priors import Weights
+from reconstruction.window.window import SlidingWindow
 
 Array = NDArray[np.float64]
 Visibility = NDArray[np.bool_]

@@ -1,4 +1,4 @@
-"""A small made-up run, written through `app.recording`: a sheet in four colours that waves before the camera."""
+"""A small made-up run, written through `app.recording.recording`: a sheet in four colours that waves before the camera."""
 
 import os
 import subprocess
@@ -10,11 +10,11 @@ import numpy as np
 import rerun_cli
 from numpy.typing import NDArray
 
-from app.recording import Recording
+from app.recording.recording import Recording
+from reconstruction.basis.mesh import Mesh, triangulate
+from reconstruction.basis.modes import ModalBasis, modal_basis
 from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
-from reconstruction.mesh import Mesh, triangulate
-from reconstruction.model import ShapeEstimate
-from reconstruction.modes import ModalBasis, modal_basis
+from reconstruction.window.model import ShapeEstimate
 from tracking.klt import Observation
 from tracking.video import Frame
 

@@ -52,7 +52,7 @@ def test_the_rule_sees_every_form_of_import(tmp_path: Path, monkeypatch: pytest.
     path = tmp_path / "reconstruction" / "x.py"
     path.parent.mkdir()
     path.write_text(
-        "import cv2\nimport app.cli as c\nfrom tracking.video import Video\nfrom . import mesh\n"
+        "import cv2\nimport app.commands.cli as c\nfrom tracking.video import Video\nfrom . import mesh\n"
         "def f():\n    import rich.progress\n    __import__('tyro')\n"
     )
     assert {name for _, name in imported(path)} == {"cv2", "app", "tracking", "reconstruction", "rich", "tyro"}
@@ -65,7 +65,7 @@ def loaded_by(statement: str) -> set[str]:
     return set(done.stdout.split())
 
 
-@pytest.mark.parametrize("module", ["app.config", "app.cli"])
+@pytest.mark.parametrize("module", ["app.options.run", "app.commands.cli"])
 def test_the_command_line_loads_nothing_heavy(module: str) -> None:
     assert loaded_by(f"import {module}") & HEAVY == set()
 
@@ -81,7 +81,7 @@ def test_a_package_can_be_used_without_the_others(package: str, absent: set[str]
 
 
 def test_help_is_instant() -> None:
-    command = [sys.executable, "-c", "from app.cli import main; main()", "--help"]
+    command = [sys.executable, "-c", "from app.commands.cli import main; main()", "--help"]
     seconds = []
     for _ in range(3):
         started = time.perf_counter()

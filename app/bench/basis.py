@@ -9,11 +9,11 @@ import numpy as np
 from scipy.linalg import eigh, subspace_angles
 from threadpoolctl import threadpool_limits
 
-from app.bench.modal_analysis import vibration_modes
 from app.bench.own_process import apart
-from app.bench.problems import MODES, surface_with_mesh
-from reconstruction import distances, landmarks
-from reconstruction.modes import EXACT_POINTS, Metric, doubly_centred, leading_eigenpairs
+from app.rivals.modal_analysis import vibration_modes
+from app.rivals.problems import MODES, surface_with_mesh
+from reconstruction.basis import distances, landmarks
+from reconstruction.basis.modes import EXACT_POINTS, Metric, doubly_centred, leading_eigenpairs
 
 POINTS = (56, 594, 3_024, 28_887)
 QUICK_POINTS = (56, 594, 28_887)

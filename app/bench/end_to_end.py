@@ -19,7 +19,7 @@ KINECT = ROOT.parent / "shared" / "data" / "kinect_paper.mp4"  # research data, 
 KINECT_ROI = (195, 95, 325, 265)
 POINTS = (800, 3_000)
 MANY_POINTS, MANY_FRAMES = 28_887, 12
-HELP = (sys.executable, "-c", "from app.cli import main; main()", "--help")
+HELP = (sys.executable, "-c", "from app.commands.cli import main; main()", "--help")
 HELP_REPEATS = 5
 QUICK_FRAMES = 120
 
@@ -89,11 +89,11 @@ def many_points(say: Say) -> tuple[int, float]:
 
 def evaluate_many() -> int:
     """Tracks of a surface that turns, reconstructed from its first true shape; returns the number of points."""
-    from app.bench.problems import FOCAL_PX, surface
-    from app.config import Evaluate
-    from app.config_model import Model
-    from app.evaluate import evaluate
-    from app.progress import Progress
+    from app.options.model import Model
+    from app.options.run import Evaluate
+    from app.pipeline.evaluate import evaluate
+    from app.rivals.problems import FOCAL_PX, surface
+    from app.terminal.progress import Progress
     from reconstruction.camera import quaternion_exp, rotation_from_quaternion
     from tracking.tracks import Tracks
 

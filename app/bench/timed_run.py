@@ -4,16 +4,16 @@ import json
 import sys
 from time import time
 
-from app.cli import parse
+from app.commands.cli import parse
 
 
 def main() -> None:
     """Run what the command line says."""
     command = parse()
     from app.bench.own_process import peak_mb
-    from app.config import Run
-    from app.progress import Progress
-    from app.session import Session
+    from app.options.run import Run
+    from app.pipeline.session import Session
+    from app.terminal.progress import Progress
 
     class Clock(Progress):
         """Hears of every frame."""

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.bench.problems import WindowStep, full_model, summed, window_step
 from app.bench.timing import growth, least_s
-from app.errors import UsageError
-from reconstruction.past import Past
-from reconstruction.solver import Solution, Solver, minimise
-from reconstruction.statistics import stack
+from app.rivals.problems import WindowStep, full_model, summed, window_step
+from app.terminal.errors import UsageError
+from reconstruction.window.marginal import Past
+from reconstruction.window.solver import Solution, Solver, minimise
+from reconstruction.window.statistics import stack
 
 POINTS = (250, 828, 3_024, 28_887, 100_000)
 MODES = (10, 20, 30)
@@ -118,7 +118,7 @@ def races(*, quick: bool, say: Say) -> Iterator[Race]:
 
 def race(step: WindowStep, deformation: str) -> Race:
     """Everybody with the loosest tolerance that ends at the same cost."""
-    from app.bench.scipy_rival import ScipyWindow
+    from app.rivals.scipy_rival import ScipyWindow
 
     least = float(solved(step, Solver(iterations=100, tolerance=1e-13)).value.sum())
     scipy = ScipyWindow(step)
@@ -128,7 +128,7 @@ def race(step: WindowStep, deformation: str) -> Race:
     ]
     ceres_ms = None
     try:
-        from app.bench.ceres_rival import CeresWindow
+        from app.rivals.ceres import CeresWindow
     except ImportError:
         pass
     else:

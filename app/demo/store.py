@@ -13,7 +13,7 @@ import numpy as np
 from app.demo.camera import SIZE, K, occluder, project, render, shading, true_shape
 from app.demo.motion import FPS, FRAMES, HEIGHT_MM, WIDTH_MM, grid, surface
 from app.demo.texture import printed_page
-from app.errors import UsageError
+from app.terminal.errors import UsageError
 
 TRUTH_EVERY = 4
 _ROI_INSET_PX = 8

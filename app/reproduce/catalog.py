@@ -1,7 +1,17 @@
 """All experiments, in the order of the report."""
 
-from app.reproduce import accuracy, basis_time, footage, metrics, missing, mode_counts, mode_shapes, organ_run, peers
 from app.reproduce.experiment import Experiment
+from app.reproduce.experiments import (
+    accuracy,
+    basis_time,
+    footage,
+    metrics,
+    missing,
+    mode_counts,
+    mode_shapes,
+    organ_run,
+    peers,
+)
 
 CATALOG: tuple[Experiment, ...] = (
     accuracy.EXPERIMENT,

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.config import Evaluate
-from app.config_model import Model
-from reconstruction.distances import MetricChoice
+from app.options.model import Model
+from app.options.run import Evaluate
+from reconstruction.basis.distances import MetricChoice
 
 
 @dataclass(frozen=True)

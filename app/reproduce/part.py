@@ -4,7 +4,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-from app.progress import Progress
+from app.terminal.progress import Progress
 
 
 class Part(Progress):

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import scipy  # type: ignore[import-untyped, unused-ignore]
 
-from app.errors import UsageError
+from app.pipeline.estimates import writable
 from app.reproduce.experiment import Experiment
 from app.reproduce.result import Result, markdown_table
-from app.results import writable
+from app.terminal.errors import UsageError
 
 Stored = dict[str, Any]
 FIGURES, FOOTAGE = "figures", "footage"

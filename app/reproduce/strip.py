@@ -4,8 +4,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.overlay import overlaid
-from app.playback import Playback
+from app.playback.overlay import overlaid
+from app.playback.playback import Playback
 
 Image = NDArray[np.uint8]
 

@@ -10,10 +10,10 @@ from typing import Self
 from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
 
-from app.config import Evaluate, Words
-from app.evaluate import evaluate
-from app.progress import stderr
+from app.options.run import Evaluate, Words
+from app.pipeline.evaluate import evaluate
 from app.reproduce.part import Part
+from app.terminal.progress import stderr
 from reconstruction import ReconstructionError
 
 

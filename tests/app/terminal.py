@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.cli import main
+from app.commands.cli import main
 from tests.tracking.scene import SIZE, texture
 
 Image = NDArray[np.uint8]
-PROGRAM = (sys.executable, "-c", "from app.cli import main; main()")
+PROGRAM = (sys.executable, "-c", "from app.commands.cli import main; main()")
 ROOT = Path(__file__).parents[2]
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "RERUN_ANALYTICS": "0"}
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reconstruction import ReconstructionError
+from reconstruction.basis.mesh import triangulate
 from reconstruction.evaluation import MIRROR, e3d, followed, score, with_missing, with_noise, with_outliers
-from reconstruction.mesh import triangulate
 from tests.reconstruction.world import SEEDS, random_rotation, relief, turn
 
 FRAMES, POINTS = 4, 20

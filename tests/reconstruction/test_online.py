@@ -6,13 +6,14 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from reconstruction import ReconstructionError, rest_shape
+from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
-from reconstruction.constraints import Deformation
 from reconstruction.evaluation import e3d, with_missing, with_outliers
-from reconstruction.model import ShapeEstimate
+from reconstruction.mapping import rest_shape
 from reconstruction.online import Phase, Reconstruction, Settings
-from reconstruction.window import robust_weights
+from reconstruction.window.constraints import Deformation
+from reconstruction.window.model import ShapeEstimate
+from reconstruction.window.window import robust_weights
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, flat, relief, rolled, seen, turn, turns
 
 FRAMES, POINTS = 26, 70

@@ -4,12 +4,12 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from reconstruction.basis.mesh import triangulate
+from reconstruction.basis.modes import Metric, modal_basis
 from reconstruction.camera import Camera, nearest_rotation, quaternion_exp, rotation_from_quaternion
-from reconstruction.mesh import triangulate
-from reconstruction.model import Model
-from reconstruction.modes import Metric, modal_basis
 from reconstruction.state import State
-from reconstruction.statistics import Statistics, stack
+from reconstruction.window.model import Model
+from reconstruction.window.statistics import Statistics, stack
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.config import Output, Run, Words
-from app.progress import Progress
-from app.session import Session
+from app.options.run import Output, Run, Words
+from app.pipeline.session import Session
+from app.terminal.progress import Progress
+from reconstruction.basis.mesh import mesh_from_faces
 from reconstruction.evaluation import e3d, followed
-from reconstruction.mesh import mesh_from_faces
 from tests.tracking.scene import texture
 from tracking.tracks import Truth
 from tracking.video import Video

@@ -141,7 +141,7 @@ def carry_out(case: Case, folder: Path, errors: Path) -> None:
         os.dup2(out, 2)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         sys.argv = ["modeshape", *case.arguments]
-        from app.cli import main
+        from app.commands.cli import main
 
         try:
             main()
@@ -159,12 +159,12 @@ def carry_out(case: Case, folder: Path, errors: Path) -> None:
 
 def work(samples: Path, first: int, count: int) -> Iterator[dict[str, object]]:
     """Every `WORKERS`-th case, one after another."""
-    import app.evaluate
-    import app.export
-    import app.modes
-    import app.retexture
-    import app.review
-    import app.session  # noqa: F401
+    import app.commands.export
+    import app.commands.modes
+    import app.commands.retexture
+    import app.commands.review
+    import app.pipeline.evaluate
+    import app.pipeline.session  # noqa: F401
 
     kept = {path.name: path.read_bytes() for path in samples.iterdir()}
     for number in range(first, count, WORKERS):

@@ -13,9 +13,9 @@ from time import process_time
 import cv2
 import numpy as np
 
-from app.config import Output, Run
-from app.progress import Progress
-from app.session import Session
+from app.options.run import Output, Run
+from app.pipeline.session import Session
+from app.terminal.progress import Progress
 from tests.robustness.degraded import changed
 
 FACE = Path(__file__).parents[2].parent / "shared" / "data" / "talking_face.mp4"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.playback import Playback
+from app.playback.playback import Playback
 from tests.app.terminal import ENVIRONMENT, PROGRAM, in_own_process, turning, write_video
 from tests.synthetic_run import verify
 

@@ -8,10 +8,10 @@ import pytest
 from numpy.typing import NDArray
 
 from app import demo
-from app.config import Output, Run
-from app.playback import Playback
-from app.progress import Progress
-from app.session import Session
+from app.options.run import Output, Run
+from app.pipeline.session import Session
+from app.playback.playback import Playback
+from app.terminal.progress import Progress
 from tests.viewer.conftest import Viewer
 from tests.viewer.screenshot import SETTLE_S, shot
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.config import Review
-from app.progress import Progress
-from app.review import review
+from app.commands.review import review
+from app.options.run import Review
+from app.terminal.progress import Progress
 from tests.synthetic_run import CORNERS_BGR, write_run
 from tests.viewer.conftest import Viewer
 from tests.viewer.screenshot import SETTLE_S, shot
@@ -26,7 +26,7 @@ def wait(until: Callable[[], bool]) -> None:
 
 def test_view_uses_the_viewer_that_runs(mortal_viewer: Viewer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = write_run(tmp_path / "one.rrd")
-    monkeypatch.setattr("app.viewer.PORT", int(mortal_viewer.address.rsplit(":", 1)[1]))
+    monkeypatch.setattr("app.recording.viewer.PORT", int(mortal_viewer.address.rsplit(":", 1)[1]))
     review(Review(run.path, view=True, json=True), Progress())
     wait(lambda: bool(mortal_viewer.client.get_state().recordings))
     [recording] = mortal_viewer.client.get_state().recordings

@@ -4,8 +4,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.recording import Recording
-from app.scenery import PREDICTED_RGB, SEEN_RGB
+from app.recording.recording import Recording
+from app.recording.styles import PREDICTED_RGB, SEEN_RGB
 from tests.synthetic_run import CORNERS_BGR, SIZE, Run, verify, write_run
 from tests.viewer.conftest import Viewer
 from tests.viewer.screenshot import SETTLE_S, shot

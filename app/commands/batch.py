@@ -1,0 +1,169 @@
+"""`modeshape batch`: many videos, here or on a cluster; failures are told, and cost only themselves."""
+
+import csv
+import hashlib
+import json
+import os
+import shlex
+import subprocess
+import sys
+import threading
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from app.commands.batch_job import UNFINISHED, Job, Words, carry_out
+from app.options.batch import Batch
+from app.terminal.errors import UsageError
+from app.terminal.progress import Progress
+from app.terminal.summary import in_words
+
+SOME_FAILED = 1
+INTERRUPTED = 130
+COLUMNS = ("frames", "points", "rest_shape", "visible_share", "losses", "objects", "reprojection_rms_px", "fps")
+SHOWN = ("frames", "visible_share", "losses", "reprojection_rms_px", "fps")
+CONNECT_S = 5.0
+
+
+def batch(command: Batch, progress: Progress) -> int:
+    """Run what is not done yet, and tell about all.
+
+    Returns:
+        exit code: 0, 1 when some failed, 130 when interrupted.
+
+    Raises:
+        UsageError: the folder cannot be written, or there is no such scheduler.
+    """
+    jobs = make_jobs(command)
+    results: dict[str, Words] = {}
+    for job in jobs:
+        before = job.done()
+        if before is not None and not (command.retry and "error" in before):
+            results[job.video] = before
+    waiting = [job for job in jobs if job.video not in results]
+    skipped, interrupted = len(results), False
+    with progress:
+        progress.expect(len(waiting))
+        try:
+            ended = on_cluster(waiting, command.scheduler) if command.scheduler else here(waiting, command.jobs)
+            for job, words in ended:
+                results[job.video] = words
+                progress.advance(job.name)
+                if "error" in words:
+                    progress.say(f"{job.video}: {words['error']}")
+        except KeyboardInterrupt:
+            interrupted = True
+    told = [{"name": job.name} | results.get(job.video, {"source": job.video, "error": "interrupted"}) for job in jobs]
+    failed = [words for words in told if "error" in words]
+    if waiting:
+        write_csv(command.out / "summary.csv", told)
+    tidy(command.out / UNFINISHED)
+    if command.json:
+        summary = {"videos": told, "skipped": skipped, "failed": len(failed), "interrupted": interrupted}
+        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
+    else:
+        print_table(told, skipped)
+    return INTERRUPTED if interrupted else SOME_FAILED if failed else 0
+
+
+def make_jobs(command: Batch) -> list[Job]:
+    """A job for each video, named after it; by a digest of its path, too, where names are equal.
+
+    Raises:
+        UsageError: the folder cannot be made.
+    """
+    folder = command.out.resolve()
+    try:
+        (folder / UNFINISHED).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"cannot write to {folder}: {error.strerror}; choose another folder with --out") from error
+    videos = list(dict.fromkeys(v if "://" in v or v.isdigit() else str(Path(v).resolve()) for v in command.videos))
+    stems = Counter(Path(video).stem for video in videos)
+    at_a_time = command.jobs or os.cpu_count() or 1
+    cores = 0 if command.scheduler else max(1, (os.cpu_count() or 1) // at_a_time)
+    found = []
+    for video in videos:
+        stem = Path(video.split("?")[0]).stem.replace("%", "") or "video"
+        digest = hashlib.sha256(video.encode()).hexdigest()[:8]
+        job = Job(video, stem, folder, tuple(shlex.split(command.options)), cores)
+        if stems[Path(video).stem] > 1 or (job.report.exists() and job.done() is None):
+            job = Job(video, f"{stem}-{digest}", folder, job.options, cores)
+        found.append(job)
+    return found
+
+
+def here(jobs: list[Job], at_a_time: int | None) -> Iterator[tuple[Job, Words]]:
+    """Carry jobs out on this machine, so many at a time; an interrupt ends them all."""
+    processes: list[subprocess.Popen[str]] = []
+    stopping = threading.Event()
+
+    def guarded(job: Job) -> Words:
+        if stopping.is_set():
+            return {"source": job.video, "error": "interrupted"}
+        try:
+            return carry_out(job, processes.append)
+        except (OSError, ValueError) as error:
+            return {"source": job.video, "error": str(error)}
+
+    with ThreadPoolExecutor(at_a_time or os.cpu_count()) as pool:
+        futures = {pool.submit(guarded, job): job for job in jobs}
+        try:
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BaseException:
+            stopping.set()
+            for process in processes:
+                if process.poll() is None:
+                    process.terminate()  # a run keeps what it has
+            raise
+
+
+def on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[Job, Words]]:
+    """Carry jobs out on the workers of a Dask scheduler.
+
+    Raises:
+        UsageError: Dask is not installed, or nobody answers.
+    """
+    try:
+        from distributed import Client
+        from distributed import as_completed as ended
+    except ImportError:
+        raise UsageError("--scheduler needs Dask: pip install 'modeshape[cluster]'") from None
+    try:
+        client = Client(scheduler, timeout=CONNECT_S)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise UsageError(f"no Dask scheduler answers at {scheduler}; start one with: dask scheduler") from error
+    with client:
+        futures = {client.submit(carry_out, job, pure=False): job for job in jobs}
+        for future in ended(futures):  # type: ignore[no-untyped-call]
+            failure, job = future.exception(), futures[future]
+            yield job, {"source": job.video, "error": str(failure)} if failure else future.result()
+
+
+def print_table(told: list[Words], skipped: int) -> None:
+    """One row per video on stdout."""
+    table = Table(title=f"{len(told)} videos" + (f", {skipped} done before" if skipped else ""), title_justify="left")
+    for column in ("video", *SHOWN, "result"):
+        table.add_column(column.replace("_", " "), overflow="fold")
+    for words in told:
+        cells = ["" if words.get(name) is None else in_words(name, words[name]) for name in SHOWN]
+        table.add_row(str(words["name"]), *cells, f"FAILED: {words['error']}" if "error" in words else "ok")
+    Console().print(table)
+
+
+def write_csv(path: Path, told: list[Words]) -> None:
+    """The same as a file."""
+    with path.open("w", newline="") as file:
+        rows = csv.DictWriter(file, ("name", "source", *COLUMNS, "recording", "error"), extrasaction="ignore")
+        rows.writeheader()
+        rows.writerows(told)
+
+
+def tidy(folder: Path) -> None:
+    """Remove a folder that is empty."""
+    if folder.is_dir() and not any(folder.iterdir()):
+        folder.rmdir()

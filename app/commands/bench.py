@@ -1,0 +1,116 @@
+"""`modeshape bench`: everything measured one after another, with ratios that have targets."""
+
+import os
+import platform
+from dataclasses import asdict
+
+from rich.console import Console
+from rich.table import Table
+from threadpoolctl import threadpool_limits
+
+from app.bench import basis, end_to_end, window
+from app.bench.targets import Ratios, markdown, rows
+from app.options.bench import README_BEGIN, README_END, Bench
+from app.options.run import Words
+from app.pipeline.estimates import check_free, writable
+from app.reproduce.report import replaced_between
+from app.terminal.errors import UsageError
+from app.terminal.progress import Progress
+
+
+def bench(command: Bench, progress: Progress) -> Words:
+    """Measure; with `--plot` and `--readme`, write.
+
+    Raises:
+        UsageError: a file cannot be written, or the README has no place for the table.
+    """
+    check_free(command.plot, overwrite=command.overwrite)
+    with_table(command, "")
+    quick, say = command.quick, progress.say
+    with progress, threadpool_limits(1):  # as in a run
+        races = list(window.races(quick=quick, say=say))
+        if races[0].ceres_ms is None:
+            say("pyceres is not installed, so Ceres takes no part: pip install 'modeshape[bench]'")
+        timings = window.timings(quick=quick, say=say)
+        basis_times = list(basis.basis_times(quick=quick, say=say))
+        angles = {metric: basis.angle_degrees(metric, say) for metric in basis.METRICS}
+        runs = list(end_to_end.whole_runs(quick=quick, say=say))
+        help_s = end_to_end.help_s(say)
+        many = None if quick else end_to_end.many_points(say)
+    ratios = window.ratios(timings, races) | basis.ratios(basis_times, angles) | end_to_end.ratios(runs, help_s, many)
+    if command.plot:
+        from app.bench.plot import draw
+
+        with writable(command.plot) as file:
+            draw(file, command.plot.suffix[1:], timings, races, basis_times)
+    if command.readme and (text := with_table(command, markdown(ratios, in_words(machine())))):
+        with writable(command.readme) as file:
+            file.write(text.encode())
+    return {
+        "machine": machine(),
+        "quick": quick,
+        "ratios": ratios,
+        "missed": [what for what, _, _, met in rows(ratios) if not met],
+        "window": [asdict(timing) for timing in timings],
+        "rivals": [asdict(race) for race in races],
+        "basis": [asdict(time) for time in basis_times],
+        "runs": [asdict(run) for run in runs],
+        "ceres": races[0].ceres_ms is not None,
+    }
+
+
+def with_table(command: Bench, table: str) -> str | None:
+    """The README with the table in it; None without one."""
+    if command.readme is None:
+        return None
+    try:
+        text = replaced_between(command.readme.read_text(), README_BEGIN, README_END, table)
+    except OSError as error:
+        raise UsageError(f"cannot read --readme {command.readme}: {error.strerror}") from None
+    if text is None:
+        raise UsageError(
+            f"--readme {command.readme} has no place for the table: put in the lines {README_BEGIN} and {README_END}"
+        )
+    return text
+
+
+def machine() -> dict[str, str | int | None]:
+    """What was measured on."""
+    return {"processor": platform.machine(), "cores": os.cpu_count(), "python": platform.python_version()}
+
+
+def in_words(facts: dict[str, str | int | None]) -> str:
+    """The machine in a line."""
+    return f"{facts['cores']} cores ({facts['processor']}), Python {facts['python']}; window step and basis on one core."
+
+
+def print_tables(words: Words) -> None:
+    """For people, on stdout."""
+    console = Console()
+    ratios, ceres = words["ratios"], words["ceres"]
+    assert isinstance(ratios, dict)
+    for title, name in (("Window step", "window"), ("Rivals", "rivals"), ("Basis", "basis"), ("Whole runs", "runs")):
+        measured = words[name]
+        assert isinstance(measured, list)
+        console.print(as_table(title, measured))
+    console.print(with_targets(ratios))
+    if not ceres:
+        console.print("Ceres took no part: pyceres is not installed; pip install 'modeshape[bench]'")
+
+
+def as_table(title: str, measured: list[dict[str, object]]) -> Table:
+    """A row for each."""
+    table = Table(title=title, title_justify="left")
+    for name in measured[0]:
+        table.add_column(name, justify="right")
+    for each in measured:
+        table.add_row(*(f"{v:.4g}" if isinstance(v, float) else "–" if v is None else str(v) for v in each.values()))
+    return table
+
+
+def with_targets(ratios: Ratios) -> Table:
+    """Figures beside what they should be."""
+    table = Table("measured", "figure", "target", "", title="Targets", title_justify="left")
+    for what, value, wanted, met in rows(ratios):
+        table.add_row(what, value, wanted, "" if met else "missed")
+    return table

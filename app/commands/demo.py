@@ -1,0 +1,26 @@
+"""`modeshape demo`: the sample video through the whole pipeline."""
+
+from pathlib import Path
+
+from app.demo import sample
+from app.options.run import Demo, Output, Run, Words
+from app.pipeline.parts import RECORDINGS
+from app.pipeline.session import Session
+from app.terminal.progress import Progress
+
+
+def demo(config: Demo) -> Words:
+    """Render the sample if it is not there yet, reconstruct it, score it, record it to recordings/demo.rrd."""
+    with Progress("rendering the sample video") as progress:
+        made = sample(progress=progress.at)
+    path = Path(RECORDINGS, "demo.rrd")
+    run = Run(
+        source=str(made.video),
+        roi=made.roi,
+        ground_truth=made.truth,
+        output=Output(out=path, overwrite=True, view=config.view, json=config.json),
+    )
+    progress = Progress()
+    if path.exists():
+        progress.say(f"replacing {path}")
+    return Session(run, progress).run()

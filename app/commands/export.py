@@ -1,0 +1,228 @@
+"""`modeshape export`: a recording as files for other programs; from the recording alone."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.options.export import Export
+from app.options.run import Words
+from app.pipeline.estimates import check_free, writable
+from app.playback.playback import Playback
+from app.terminal.errors import UsageError
+from app.terminal.progress import Progress
+
+Array = NDArray[np.float64]
+
+FOLDERS = ("obj", "ply", "csv")  # formats with more than one file
+VIDEOS = ("mp4", "webm")
+OWN_FILES = (
+    "frame_*.obj",
+    "frame_*.ply",
+    "surface.mtl",
+    "texture.png",
+    "points.csv",
+    "frames.csv",
+    "lambda.csv",
+    "mesh.csv",
+)
+UPRIGHT = np.array([1.0, -1.0, -1.0])  # half a turn about x: y up, z towards the viewer
+
+
+def export(command: Export, progress: Progress) -> Words:
+    """Carry out the command.
+
+    Returns:
+        what was written.
+
+    Raises:
+        UsageError: a recording that cannot be read, that has no model or no pictures, or files that cannot be written.
+    """
+    kind = command.kind
+    out = command.out or default_path(command.recording, kind)
+    if kind in FOLDERS:
+        check_folder(out, overwrite=command.overwrite)
+    playback = Playback.load(command.recording)
+    for note in playback.notes:
+        progress.say(note)
+    playback.need_model()
+    if not playback.shaped.any():
+        raise UsageError(f"{playback.path} contains no shape: run again for longer")
+    if kind not in FOLDERS:
+        check_free(out, overwrite=command.overwrite)
+    with progress:
+        progress.expect(len(playback.frames) if kind in (*VIDEOS, "csv") else int(playback.shaped.sum()))
+
+        def advance() -> None:
+            progress.advance("writing")
+
+        if kind == "glb":
+            write_glb(playback, out)
+        elif kind == "npz":
+            from app.playback.tables import write_npz
+
+            with writable(out) as file:
+                write_npz(playback, file, advance)
+        elif kind == "csv":
+            from app.playback.tables import write_csv
+
+            with complete_folder(out) as folder:
+                write_csv(playback, folder, advance)
+        elif kind in VIDEOS:
+            write_video(playback, out, advance)
+        else:
+            with complete_folder(out) as folder:
+                write_meshes(playback, folder, command, advance)
+    return {
+        "exported": str(playback.path),
+        "format": kind,
+        "frames": len(playback.frames),
+        "frames_with_shape": int(playback.shaped.sum()),
+        "points": playback.W.shape[2],
+        "out": str(out),
+        "megabytes": megabytes(out),
+    }
+
+
+def write_glb(playback: Playback, out: Path) -> None:
+    """An animated mesh; frames without a shape hold the last one."""
+    from app.files.gltf import MovingMesh, glb
+
+    camera, (width, height) = playback.camera, playback.size
+    s = held(playback.s)
+    t = held(playback.t)
+    if camera.perspective:
+        origin = np.column_stack([t, np.full(len(t), camera.focal_px)]) / s[:, None]
+        scale = np.ones(len(s))
+        view = (2 * float(np.arctan(height / (2 * camera.focal_px))), width / height)
+    else:
+        origin, scale, view = np.column_stack([t, np.zeros(len(t))]), s, None
+    moving = MovingMesh(
+        basis=playback.basis,
+        faces=playback.mesh.faces,
+        uv=texture_coordinates(playback),
+        texture_bgr=playback.texture_bgr,
+        times_s=playback.times_s,
+        quaternion=held(playback.quaternion),
+        origin=origin,
+        scale=scale,
+        Lambda=held(playback.Lambda),
+        field_of_view=view,
+    )
+    with writable(out) as file:
+        file.write(glb(moving, playback.name))
+
+
+def write_meshes(playback: Playback, folder: Path, command: Export, advance: Callable[[], None]) -> None:
+    """A mesh file for each frame with a shape."""
+    from app.files.mesh_sequence import MeshSequence
+
+    upright = command.axes == "y-up"
+    axes = "x right, y up, z towards the viewer" if upright else "x right, y down, z forward (camera axes)"
+    comment = f"modeshape {playback.version}; {axes}; unit: pixels of the first frame"
+    kind: Literal["obj", "ply"] = "obj" if command.kind == "obj" else "ply"
+    sequence = MeshSequence(folder, kind, playback.mesh.faces, texture_coordinates(playback), comment)
+    sequence.texture(cv2.imencode(".png", playback.texture_bgr)[1].tobytes())
+    for i in np.flatnonzero(playback.shaped).tolist():
+        estimate = playback.estimate(i)
+        assert estimate is not None
+        vertices = estimate.shape.T
+        sequence.add(int(playback.frames[i]), vertices * UPRIGHT if upright else vertices)
+        advance()
+
+
+def write_video(playback: Playback, out: Path, advance: Callable[[], None]) -> None:
+    """The pictures with mesh, points and reprojections drawn over them, at the video's pace."""
+    from app.files.video_out import VideoSink
+    from app.playback.overlay import enlarged, overlaid
+
+    fps, shown = steady(playback.times_s)
+    with VideoSink(out, enlarged(playback.size), fps) as video:
+        for i, image in overlaid(playback):
+            for _ in range(int(shown[i])):
+                video.write(image)
+            advance()
+
+
+def steady(times_s: Array) -> tuple[float, NDArray[np.int64]]:
+    """Frames per second of a video, and how many times each frame (F,) is shown so that it keeps its time there."""
+    steps = np.diff(times_s)
+    if not (steps > 0).any():
+        return 25.0, np.ones(len(times_s), np.int64)
+    fps = float(1 / np.median(steps[steps > 0]))
+    ticks = np.round((times_s - times_s[0]) * fps).astype(np.int64)
+    return fps, np.diff(ticks, append=ticks[-1] + 1).clip(0)
+
+
+def held(values: Array) -> Array:
+    """Rows (F, …) with those that are NaN replaced by the last one before that is not, at the start by the first one."""
+    known = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    index = np.maximum.accumulate(np.where(known, np.arange(len(values)), -1))
+    return np.asarray(values[np.where(index < 0, int(known.argmax()), index)])
+
+
+def texture_coordinates(playback: Playback) -> Array:
+    """Of the vertices (p, 2) in the texture, 0 … 1 from its top left corner; pixel centres are at halves."""
+    height, width = playback.texture_bgr.shape[:2]
+    return np.asarray((playback.texture_px - playback.texture_origin + 0.5) / (width, height))
+
+
+def default_path(recording: Path, kind: str) -> Path:
+    """Beside the recording; a video gets a name of its own, so as not to be that of its source."""
+    if kind in FOLDERS:
+        return recording.with_name(f"{recording.stem}_{kind}")
+    return recording.with_name(f"{recording.stem}{'-overlay' if kind in VIDEOS else ''}.{kind}")
+
+
+def check_folder(folder: Path, *, overwrite: bool) -> None:
+    """See to it, before anything is computed, that files can be written into a folder of their own.
+
+    Raises:
+        UsageError: there is something in it and may not be replaced, or it cannot be made.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{folder} is a file: choose another name for the folder")
+    if folder.is_dir() and any(folder.iterdir()) and not overwrite:
+        raise UsageError(f"{folder} exists: replace what is in it with --overwrite, or choose another name")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=folder if folder.is_dir() else folder.parent):
+            pass
+    except OSError as error:
+        raise UsageError(f"cannot write {folder}: {error.strerror}; choose another place") from error
+
+
+@contextmanager
+def complete_folder(folder: Path) -> Iterator[Path]:
+    """A folder to write files to, which appear in `folder` when all are there; of an earlier export nothing remains.
+
+    Raises:
+        UsageError: the files cannot be written.
+    """
+    part = folder.with_name(folder.name + ".part")
+    try:
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir()
+        yield part
+        folder.mkdir(exist_ok=True)
+        for pattern in OWN_FILES:  # and nothing else: the folder may be anybody's
+            for old in folder.glob(pattern):
+                old.unlink()
+        for made in part.iterdir():
+            made.replace(folder / made.name)
+    except OSError as error:
+        raise UsageError(f"cannot write {folder}: {error.strerror}; free some space or choose another place") from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def megabytes(path: Path) -> float:
+    """Of a file, or of all files in a folder."""
+    files = [path] if path.is_file() else list(path.iterdir())
+    return round(sum([file.stat().st_size for file in files]) / 1e6, 3)

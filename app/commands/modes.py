@@ -1,0 +1,101 @@
+"""`modeshape modes`: the mode shapes of a recording's or of given tracks' rest shape as a figure."""
+
+import zipfile
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from app.options.export import Modes
+from app.options.run import Evaluate, Words
+from app.pipeline.estimates import check_free, writable
+from app.terminal.progress import Progress
+from reconstruction.basis.distances import Metric, MetricChoice, dissimilarity, fitting
+from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.modes import ModalBasis, doubly_centred, exact_points, is_flat
+
+Array = NDArray[np.float64]
+
+
+def modes(command: Modes, progress: Progress) -> Words:
+    """Carry out the command.
+
+    Returns:
+        what was drawn.
+
+    Raises:
+        UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
+    """
+    check_free(command.out, overwrite=command.overwrite)
+    with threadpool_limits(1), progress:
+        recorded = not zipfile.is_zipfile(command.source)  # an .npz is one
+        name, basis, mesh, metric = (of_recording if recorded else of_tracks)(command, progress)
+        eigenvalues = spectrum(basis, mesh, metric)
+        png = draw(basis, mesh, eigenvalues, title(name, basis, metric), columns=command.columns)
+    with writable(command.out) as file:
+        file.write(png)
+    return {
+        "source": str(command.source),
+        "points": basis.rest.shape[1],
+        "modes": len(basis.eigenvalues),
+        "metric": metric,
+        "eigenvalues": basis.eigenvalues.tolist(),
+        "share": float(basis.eigenvalues.sum() / eigenvalues.clip(0).sum()),
+        "out": str(command.out),
+    }
+
+
+def of_recording(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, Metric]:
+    """Name, modes, mesh and metric of a recording."""
+    from app.playback.playback import Playback
+
+    playback = Playback.load(command.source)
+    for note in playback.notes:
+        progress.say(note)
+    asked = cast(MetricChoice, playback.configuration.get("metric", "euclidean"))
+    return playback.name, playback.basis, playback.mesh, fitting(asked, flat=is_flat(playback.basis.rest))
+
+
+def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, Metric]:
+    """The same of tracks: their first frames are reconstructed until there is a rest shape."""
+    from app.pipeline.evaluate import prepare
+    from tracking.tracks import Tracks
+
+    tracks = Tracks.load(command.source)
+    asked = Evaluate(command.source, rest_shape=command.rest_shape, camera=command.camera, model=command.model)
+    reconstruction = prepare(asked, tracks)
+    for W, visible in zip(tracks.W, tracks.visible, strict=True):
+        reconstruction.update(np.where(visible, W, np.nan), visible)
+        progress.advance("rest shape")
+        if reconstruction.rest is not None and reconstruction.window is not None:
+            break
+    else:
+        reconstruction.finish()
+    assert reconstruction.rest is not None
+    progress.say(reconstruction.rest.note)
+    assert reconstruction.metric is not None
+    return Path(command.source).stem, reconstruction.model.basis, reconstruction.model.mesh, reconstruction.metric
+
+
+def spectrum(basis: ModalBasis, mesh: Mesh, metric: Metric) -> Array:
+    """All eigenvalues (p,) of −½CDC, descending; of many points those of the basis, since D would not fit in memory."""
+    if basis.rest.shape[1] > exact_points(metric):
+        return basis.eigenvalues
+    D = dissimilarity(metric, basis.rest, mesh.edges)
+    return np.asarray(np.linalg.eigvalsh(doubly_centred(D))[::-1], np.float64)
+
+
+def title(name: str, basis: ModalBasis, metric: str) -> str:
+    """The figure's headline."""
+    return f"Mode shapes of {name}: {basis.rest.shape[1]} points, {metric} distances"
+
+
+def draw(
+    basis: ModalBasis, mesh: Mesh, eigenvalues: Array, headline: str, *, columns: int = 5, jpeg: bool = False
+) -> bytes:
+    """The figure as a PNG or, smaller, as a JPEG."""
+    from app.recording.modes_figure import modes_figure
+
+    return modes_figure(basis, mesh, eigenvalues, title=headline, columns=columns, jpeg=jpeg)

@@ -1,0 +1,194 @@
+"""`modeshape retexture`: a picture on the moving surface, from a recording or live while a video is tracked."""
+
+from pathlib import Path
+from time import perf_counter
+from types import TracebackType
+from typing import Self, cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.commands.export import steady
+from app.files.video_out import PacedVideo, VideoSink, check_video_format
+from app.options.retexture import Retexture
+from app.options.run import Words, parse_range
+from app.painting.compositing import Compositor, Laid
+from app.painting.picture import Artwork
+from app.pipeline.estimates import check_free
+from app.pipeline.session import Session
+from app.playback.playback import Playback
+from app.terminal.errors import UsageError
+from app.terminal.progress import Progress
+from reconstruction.window.model import Model, ShapeEstimate
+from tracking.klt import Observation
+from tracking.video import Frame
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+RRD_MAGIC = b"RRF"
+STILL_PX = 1.0
+
+
+def retexture(command: Retexture, progress: Progress) -> Words:
+    """Carry out the command.
+
+    Returns:
+        what was written.
+
+    Raises:
+        UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
+    """
+    check_video_format(command.out)
+    check_free(command.out, overwrite=command.overwrite)
+    with Artwork(command.texture) as artwork, Painter(command, artwork) as painter:
+        if is_recording(command.source):
+            words = play(command, painter, progress)
+        else:
+            words = Session(command.run, progress, painter).run()
+    return words | {"painted_frames": painter.painted, "paint_ms": painter.milliseconds, "out": str(command.out)}
+
+
+class Painter:
+    """Paints frames as they come and writes them; a context manager that completes the video.
+
+    Args:
+        command: what the person asked for.
+        artwork: the picture or video put on the surface.
+    """
+
+    def __init__(self, command: Retexture, artwork: Artwork) -> None:
+        self._out, self._laid = command.out, Laid(command.place, command.opacity)
+        self._artwork = artwork
+        self._sink: VideoSink | None = None
+        self._compositor: Compositor | None = None
+        self._begun_s = 0.0
+        self._elapsed_s = 0.0
+        self.painted = 0
+
+    @property
+    def milliseconds(self) -> float | None:
+        """Mean time of painting a frame."""
+        return self._elapsed_s * 1e3 / self.painted if self.painted else None
+
+    def begin(self, first: Frame, points_px: Array, model: Model, fps: float) -> None:
+        """The first frame, the vertices (p, 2) px in it, the model, and the rate of the video.
+
+        Of a second object, it is not painted: the picture was made for the first.
+        """
+        if self._sink is not None:
+            self._compositor = None
+            return
+        perspective = model.camera.perspective
+        self._compositor = Compositor(first.image, points_px, model.mesh, perspective=perspective, laid=self._laid)
+        height, width = first.image.shape[:2]
+        self._sink = VideoSink(self._out, (width, height), fps).__enter__()
+        self._paced = PacedVideo(self._sink, fps)
+        self._begun_s = first.time_s
+
+    def frame(self, frame: Frame, observation: Observation, estimate: ShapeEstimate | None) -> None:
+        """Paint and write a frame; one without a shape stays as it is."""
+        if self._sink is None:
+            return
+        image = frame.image
+        if estimate is not None and self._compositor is not None:
+            picture = self._artwork.at(frame.time_s - self._begun_s)
+            started = perf_counter()
+            image = self._compositor.paint(image, picture, estimate.projection_px, estimate.shape[2], observation.points_px)
+            self._elapsed_s += perf_counter() - started
+            self.painted += 1
+        self._paced.write(image, frame.time_s)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._sink is None:
+            return
+        try:
+            if kind is None:
+                self._paced.end()
+        except UsageError as failure:
+            self._sink.__exit__(UsageError, failure, None)
+            raise
+        self._sink.__exit__(kind, error, trace)
+
+
+def play(command: Retexture, painter: Painter, progress: Progress) -> Words:
+    """Let a painter see a recording.
+
+    Raises:
+        UsageError: it cannot be read, has no model or no pictures, or an option does not go with it.
+    """
+    live = {
+        "--roi": command.roi,
+        "--mask": command.mask,
+        "--rrd": command.rrd,
+        "--view": command.view or None,
+    }
+    for option in (name for name, value in live.items() if value is not None):
+        raise UsageError(f"{option} is for videos, not for the recording {command.source}: leave it out")
+    playback = Playback.load(Path(command.source))
+    model = playback.need_model()
+    for note in playback.notes:
+        progress.say(note)
+    first, stop = parse_range(command.frames)
+    wanted = (playback.frames >= first) & (playback.frames < (stop or np.inf))
+    if not wanted.any():
+        numbers = f"{playback.frames[0]} to {playback.frames[-1]}"
+        raise UsageError(f"{playback.path} has no frame in {command.frames}: it contains the frames {numbers}")
+    begun = interrupted = False
+    with progress:
+        progress.expect(int(wanted.sum()))
+        try:
+            for i, image in playback.images():
+                number = int(playback.frames[i])
+                if stop is not None and number >= stop:
+                    break
+                if image is None:
+                    continue
+                frame = Frame(number, float(playback.times_s[i]), image)
+                if not begun:
+                    still = Frame(number, frame.time_s, first_frame(playback, i, image))
+                    painter.begin(still, playback.texture_px, model, steady(playback.times_s)[0])
+                    begun = True
+                if number < first:
+                    continue
+                painter.frame(frame, Observation(playback.W[i].T, playback.visible[i]), playback.estimate(i))
+                progress.advance("painting")
+        except KeyboardInterrupt:
+            interrupted = True
+    if not begun:
+        raise UsageError(f"{playback.path} contains no pictures: run again with --image jpeg or --image video")
+    return {"source": command.source, "frames": len(playback.frames), "interrupted": interrupted}
+
+
+def first_frame(playback: Playback, i: int, image: Image) -> Image:
+    """The frame (H, W, 3) in which the vertices are at `texture_px`, right where the surface is.
+
+    It need not be in the recording, which may be a later part of a long one; the mesh's texture is a crop of it. Where
+    `run --texture` has painted that, it has to be the recording's first `image`, of row i.
+
+    Raises:
+        UsageError: there it is not.
+    """
+    if playback.configuration.get("texture") is None:
+        (width, height), (x, y), (h, w) = playback.size, playback.texture_origin.tolist(), playback.texture_bgr.shape[:2]
+        border = (y, height - y - h, x, width - x - w)
+        return cast(Image, cv2.copyMakeBorder(playback.texture_bgr, *border, cv2.BORDER_REPLICATE))
+    moved = np.linalg.norm(playback.W[i].T - playback.texture_px, axis=1)[playback.visible[i]]
+    if not len(moved) or np.median(moved) > STILL_PX:
+        raise UsageError(f"{playback.path} begins later than its run: give the first part of the recording")
+    return image
+
+
+def is_recording(source: str) -> bool:
+    """Whether a source is a recording, or is said to be one by its name."""
+    path = Path(source)
+    if path.suffix.lower() == ".rrd":
+        return True
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(len(RRD_MAGIC)) == RRD_MAGIC

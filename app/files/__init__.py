@@ -1,0 +1,1 @@
+"""Files other than recordings: safe writing, videos, meshes, glTF."""

@@ -1,0 +1,1 @@
+"""What a person can choose; nothing heavy is imported here, so that `--help` is instant."""

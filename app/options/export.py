@@ -1,0 +1,97 @@
+"""What a person can choose of `export` and `modes`; nothing heavy is imported here, so that `--help` is instant."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.options.model import Model
+from app.terminal.errors import UsageError
+
+
+@dataclass(frozen=True)
+class Export:
+    """A recording as files for other programs, from the .rrd alone.
+
+    Formats:
+      glb    animated mesh with texture for Blender and every glTF viewer: the modes are morph targets. y up, right-handed;
+             the rest shape is 1 m long, its first place the origin; time 0 is the first frame
+      obj    a folder with frame_000123.obj for each frame, one material and texture; axes: --axes
+      ply    the same as PLY
+      csv    a folder: points.csv (seen, projected, in 3-D), frames.csv (pose and camera path), lambda.csv, mesh.csv
+      npz    the arrays of `run --shapes-out`, and observed and projected points, times, camera path
+      mp4    the video with mesh, points and reprojections drawn over it
+      webm   the same, for browsers
+
+    Axes and units:
+      camera axes (csv, npz, obj, ply): x right, y down, z forward, as the camera sees
+      y-up axes (glb; obj and ply with --axes y-up): x right, y up, z towards the viewer
+      unit (all but glb): a pixel of the first frame, in depth too, since an uncalibrated camera has no metres
+
+    Examples:
+      modeshape export recordings/demo.rrd --format glb
+      modeshape export recordings/demo.rrd --format obj --axes y-up --out sheet_obj
+      modeshape export recordings/demo.rrd --out demo.webm
+    """
+
+    recording: tyro.conf.Positional[Path]
+    """The recording (.rrd); one of a killed run will do."""
+    format: Literal["glb", "obj", "ply", "csv", "npz", "mp4", "webm"] | None = None
+    """What to write; without it, what the ending of --out says."""
+    out: Path | None = None
+    """File, or folder for obj, ply and csv; without it beside the recording and named after it."""
+    axes: Literal["camera", "y-up"] = "camera"
+    """Of obj and ply."""
+    overwrite: bool = False
+    """Replace what an earlier export wrote."""
+    json: bool = False
+    """Print what was written as JSON on stdout."""
+
+    def __post_init__(self) -> None:
+        ending = self.out.suffix.lower().lstrip(".") if self.out else ""
+        single = ("glb", "npz", "mp4", "webm")
+        if self.format is None and ending not in single:
+            raise UsageError("no format: give --format glb, obj, ply, csv, npz, mp4 or webm")
+        if self.format in single and self.out and ending != self.format:
+            raise UsageError(f"--out {self.out} does not fit --format {self.format}: let it end in .{self.format}")
+
+    @property
+    def kind(self) -> str:
+        """The format, given or told by the ending."""
+        return self.format or (self.out.suffix.lower().lstrip(".") if self.out else "")
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Draw the mode shapes of a rest shape: the leading modes in and out of the plane, and the eigenvalues.
+
+    A recording shows the modes it was made with. For tracks, rest shape and modes are found as by `evaluate`,
+    with the options below.
+
+    Examples:
+      modeshape modes recordings/demo.rrd --out modes.png
+      modeshape modes tracks.npz --rest-shape first-truth --metric manhattan
+    """
+
+    source: tyro.conf.Positional[Path]
+    """A recording (.rrd) or tracks (.npz)."""
+    out: Path = Path("modes.png")
+    """The figure, a PNG."""
+    overwrite: bool = False
+    """Replace an existing file."""
+    columns: int = 5
+    """Modes shown."""
+    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|first-truth|PATH")] = "auto"
+    """Where the rest shape of tracks comes from: the first frames, the first true shape, or a mesh file."""
+    camera: Literal["auto", "perspective", "orthographic"] = "auto"
+    """Auto: perspective if the tracks have K, else orthographic."""
+    json: bool = False
+    """Print the eigenvalues and what they come from as JSON on stdout."""
+    model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.columns <= 12:
+            raise UsageError(f"--columns {self.columns} does not fit: give 1 to 12")
+        if self.out.suffix.lower() != ".png":
+            raise UsageError(f"--out {self.out} is no PNG: let it end in .png")

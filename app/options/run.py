@@ -1,0 +1,234 @@
+"""What a person can choose; nothing heavy is imported here, so that `--help` is instant."""
+
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from app.options.model import Model
+from app.terminal.errors import UsageError
+
+Words = dict[str, object]
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where results go."""
+
+    out: Path | None = None
+    """The recording; without it recordings/NAME.rrd, numbered if that exists."""
+    overwrite: bool = False
+    """Replace existing files."""
+    tracks_out: Path | None = None
+    """Save the tracked points as .npz: W (F, 2, P), visible (F, P); those of later objects in NAME-object2.npz, …"""
+    shapes_out: Path | None = None
+    """Save the shapes as .npz: S (F, 3, P) camera axes, R, s, t, Lambda, faces, visible; those of later objects in
+    NAME-object2.npz, …"""
+    split_minutes: float | None = None
+    """Start another recording after so many minutes of video: NAME.rrd, NAME-part2.rrd, … Each is complete in itself. With
+    another object, one is started in any case."""
+    image: Literal["jpeg", "video", "none"] = "jpeg"
+    """How frames are stored in the recording: each as JPEG, the video file as it is, or not at all."""
+    view: bool = False
+    """Open the viewer and watch live."""
+    connect: str | None = None
+    """Address (host:port) of a running viewer to watch live in."""
+    json: bool = False
+    """Print the summary as JSON on stdout."""
+
+    def __post_init__(self) -> None:
+        if self.split_minutes is not None:
+            if not self.split_minutes > 0:
+                raise UsageError(f"--split-minutes {self.split_minutes} is no time: give more than 0")
+            if self.image == "video":
+                raise UsageError("--split-minutes does not go with --image video: use --image jpeg")
+
+
+@dataclass(frozen=True)
+class Source:
+    """What is reconstructed from: the options that `run` and a live `retexture` share."""
+
+    source: tyro.conf.Positional[str]
+    """Video file, image pattern (img%04d.png), camera index or URL."""
+    roi: tuple[int, int, int, int] | None = None
+    """Region with the surface in the first frame: X Y WIDTH HEIGHT in pixels; without it the whole frame."""
+    mask: Path | None = None
+    """Picture of the video's size, white where the surface is in the first frame."""
+    frames: Annotated[str, tyro.conf.arg(metavar="A:B")] = ":"
+    """Frames A to B-1 of the source."""
+    duration: float | None = None
+    """Stop so many seconds after the first frame."""
+    drop_late: bool = False
+    """Of a camera or stream, take always the newest frame, and leave out those there is no time for."""
+    points: int = 800
+    """Most points tracked."""
+    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|PATH")] = "auto"
+    """Where the rest shape comes from: the first frames (a turning object: rigid; a flat sheet: plane), or a mesh file."""
+    camera: Literal["perspective", "orthographic"] = "perspective"
+    """How the picture came about."""
+    model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
+
+    def __post_init__(self) -> None:
+        if self.points < 4:
+            raise UsageError(f"--points {self.points} is too few: give 4 and more")
+        if self.duration is not None and not self.duration > 0:
+            raise UsageError(f"--duration {self.duration} is no time: give seconds, more than 0")
+
+    @property
+    def frame_range(self) -> tuple[int, int | None]:
+        """First frame, and the one after the last or None."""
+        return parse_range(self.frames)
+
+
+@dataclass(frozen=True)
+class Run(Source):
+    """Reconstruct a video, frame by frame, and record it.
+
+    After a cut to a scene that the object is not in, another object is followed there, in a recording of its own
+    (NAME-part2.rrd, …): 2 s after a cut, 10 s after it was covered or left the picture. The summary is about the first.
+
+    Examples:
+      modeshape run paper.mp4 --roi 195 95 325 265
+      modeshape run 0 --view                        # the first camera, live
+      modeshape run http://camera.local/mjpeg --drop-late --split-minutes 30
+      modeshape run frames/img%04d.png --mask sheet.png --frames 10:200
+      modeshape run sheet.mp4 --focal 900 --shapes-out shapes.npz --json
+      modeshape run sheet.mp4 --texture logo.png --place 250 160 90 60 --view
+    """
+
+    ground_truth: Path | None = None
+    """True shapes (.npz with W_px, S_gt, gt_frames) to score the first object against."""
+    texture: Path | None = None
+    """Picture (or video: its first) painted on the first object's mesh in recording and viewer; for a video of it:
+    modeshape retexture."""
+    place: tuple[int, int, int, int] | None = None
+    """Where --texture lies in the first frame: X Y WIDTH HEIGHT in pixels; without it over the whole mesh."""
+    opacity: float = 1.0
+    """Of --texture, 0 to 1."""
+    output: tyro.conf.OmitArgPrefixes[Output] = Output()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_laid(self.place, self.opacity)
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Reconstruct from given tracks and score against the truth in the file.
+
+    Examples:
+      modeshape evaluate tracks.npz --rest-shape first-truth --deformation bending
+      modeshape evaluate tracks.npz --missing 0.4 --seed 0 --json
+    """
+
+    tracks: tyro.conf.Positional[Path]
+    """Tracks (.npz): W (F, 2, P), visible (F, P), and K, S_gt, gt_frames where known."""
+    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|first-truth|PATH")] = "auto"
+    """Where the rest shape comes from: the first frames, the first true shape, or a mesh file."""
+    camera: Literal["auto", "perspective", "orthographic"] = "auto"
+    """Auto: perspective if the file has K, else orthographic."""
+    missing: float = 0.0
+    """Share of the entries hidden at random."""
+    noise: float = 0.0
+    """Gaussian noise, as a share of the largest distance of a point to the centroid."""
+    outliers: float = 0.0
+    """Share of the entries put anywhere among the others."""
+    seed: int = 0
+    """Of the noise, the hidden entries and the outliers."""
+    shapes_out: Path | None = None
+    """Save the shapes as .npz: S (F, 3, P) camera axes, R, s, t, Lambda, faces, visible."""
+    overwrite: bool = False
+    """Replace existing files."""
+    json: bool = False
+    """Print the scores as JSON on stdout."""
+    model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.missing < 1:
+            raise UsageError(f"--missing {self.missing} is no share: give 0 to less than 1")
+        if not 0 <= self.outliers < 1:
+            raise UsageError(f"--outliers {self.outliers} is no share: give 0 to less than 1")
+        if self.noise < 0:
+            raise UsageError(f"--noise {self.noise} is no noise level: give 0 and more")
+        if self.seed < 0:
+            raise UsageError(f"--seed {self.seed} is no seed: give 0 and more")
+
+
+@dataclass(frozen=True)
+class Demo:
+    """Render the sample video, reconstruct it, score it against its truth and record it to recordings/demo.rrd."""
+
+    view: bool = False
+    """Open the viewer and watch live."""
+    json: bool = False
+    """Print the summary as JSON on stdout."""
+
+
+@dataclass(frozen=True)
+class Review:
+    """What is in a recording: a table, JSON, CSV, a figure, or the viewer; of two recordings side by side.
+
+    Examples:
+      modeshape review recordings/demo.rrd
+      modeshape review recordings/demo.rrd --plot demo.png --csv demo.csv
+      modeshape review recordings/paper.rrd recordings/paper-2.rrd --view
+    """
+
+    recording: tyro.conf.Positional[Path]
+    """The recording (.rrd); one of a killed run will do."""
+    other: tyro.conf.Positional[Path | None] = None
+    """Another one to compare it with."""
+    csv: Path | None = None
+    """Write a row per frame: phase, points seen, lost and recovered, errors, milliseconds, pose, sizes of Λ's rows."""
+    plot: Path | None = None
+    """Draw errors, points seen, Λ over time, times and eigenvalues as .png, .pdf or .svg."""
+    overwrite: bool = False
+    """Replace existing files."""
+    view: bool = False
+    """Open the viewer; two recordings are shown side by side."""
+    connect: str | None = None
+    """Address (host:port) of a running viewer to show it in."""
+    json: bool = False
+    """Print the facts as JSON on stdout; of two recordings as a list in "recordings"."""
+
+
+def check_laid(place: tuple[int, int, int, int] | None, opacity: float) -> None:
+    """See to it that a picture can lie there.
+
+    Raises:
+        UsageError: it cannot.
+    """
+    if place is not None and (place[2] < 1 or place[3] < 1):
+        raise UsageError(f"--place {' '.join(map(str, place))} has no area: give X Y WIDTH HEIGHT, both sizes 1 and more")
+    if not 0 <= opacity <= 1:
+        raise UsageError(f"--opacity {opacity} is no opacity: give 0 to 1")
+
+
+def parse_range(text: str) -> tuple[int, int | None]:
+    """`A:B` as (A, B), with 0 and None where left out.
+
+    Raises:
+        UsageError: not of that form.
+    """
+    first, colon, stop = text.partition(":")
+    try:
+        if not colon:
+            raise ValueError
+        a, b = int(first or 0), int(stop) if stop else None
+        if a < 0 or (b is not None and b <= a):
+            raise ValueError
+    except ValueError:
+        raise UsageError(f"--frames {text} is no range: give A:B with 0 <= A < B, for instance 0:300") from None
+    return a, b
+
+
+def as_words(config: Run | Evaluate) -> Words:
+    """The configuration as a flat dictionary, as it is stored in a recording."""
+    words = asdict(config)
+    for group in ("model", "output"):
+        words.update(words.pop(group, {}))
+    return {
+        name: list(v) if isinstance(v, tuple) else v if isinstance(v, int | float | None) else str(v)
+        for name, v in words.items()
+    }

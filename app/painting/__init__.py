@@ -1,0 +1,1 @@
+"""New textures on the moving surface: compositing, occlusion, shading."""

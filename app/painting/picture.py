@@ -1,0 +1,196 @@
+"""The picture that is put on a surface: a still or a video, placed in the first frame, filtered for its size there."""
+
+from pathlib import Path
+from types import TracebackType
+from typing import Self, cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.painting.shading import sampled
+from app.terminal.errors import UsageError
+from tracking import TrackingError
+from tracking.video import Frame, Video
+
+Image = NDArray[np.uint8]
+Floats = NDArray[np.float32]
+Box = tuple[int, int, int, int]
+
+STILLS = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff"))
+FINEST = 2.0  # texels kept per pixel of the first frame: enough for a surface that comes twice as near
+SHARPEN = 0.3  # levels: bilinear sampling bears this much minification
+SPREAD = 0.35  # new pixels, of the blur before shrinking
+STEP_PX = 4  # between the pixels whose minification is looked at
+
+
+class Artwork:
+    """A picture or a video to be put on a surface; a context manager.
+
+    Args:
+        path: a picture, with or without an alpha channel, or a video, which is repeated when it ends.
+
+    Raises:
+        UsageError: it cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        if not path.is_file():
+            raise UsageError(f"no texture {path}: give a PNG, a JPEG or a video")
+        self._path = path
+        self._video = None if path.suffix.lower() in STILLS else self._opened()
+        if self._video is None:
+            self._picture = premultiplied(read_picture(path))
+            return
+        self._begun_s = 0.0  # when the video began its present round
+        self._rewind(self._video)
+
+    def at(self, time_s: float) -> Image:
+        """What is to be seen at a time, which never goes back: (h, w, 4) BGR, premultiplied, and alpha."""
+        if self._video is None:
+            return self._picture
+        while self._begun_s + self._until_s() <= time_s:
+            if self._next is None:
+                self._begun_s += self._until_s()
+                self._video.close()
+                self._video = self._opened()
+                self._rewind(self._video)
+            else:
+                self._show(self._next)
+        return self._picture
+
+    def _until_s(self) -> float:
+        """When, in its round, the picture shown has had its time."""
+        if self._next is not None:
+            return self._next.time_s
+        assert self._video is not None
+        return self._shown_s + 1.0 / self._video.fps
+
+    def _rewind(self, video: Video) -> None:
+        self._frames = iter(video)
+        self._show(next(self._frames))
+
+    def _show(self, frame: Frame) -> None:
+        self._shown_s = frame.time_s
+        self._picture = premultiplied(frame.image)
+        self._next: Frame | None = next(self._frames, None)
+
+    def _opened(self) -> Video:
+        try:
+            return Video(str(self._path))
+        except TrackingError as error:
+            raise UsageError(f"the texture {self._path} is no picture and no video that can be read: {error}") from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Release a video; may be called again."""
+        if self._video is not None:
+            self._video.close()
+
+
+class Levels:
+    """A picture laid on the first frame, at every size it may be seen in.
+
+    Args:
+        picture: (h, w, 4) premultiplied.
+        place: x, y, width, height in px of the first frame.
+    """
+
+    def __init__(self, picture: Image, place: Box) -> None:
+        self._place = place
+        h, w = picture.shape[:2]
+        most = (max(1, round(FINEST * place[2])), max(1, round(FINEST * place[3])))
+        if w > most[0] or h > most[1]:
+            picture = shrunk(picture, (min(w, most[0]), min(h, most[1])))
+        self._levels = [picture]
+        while max(self._levels[-1].shape[:2]) > 1:
+            h, w = self._levels[-1].shape[:2]
+            self._levels.append(shrunk(self._levels[-1], (max(1, w // 2), max(1, h // 2))))
+
+    def seen(self, uv: Floats, cover: Floats) -> Image:
+        """The picture (h, w, 4) where the places uv (h, w, 2) of the first frame are seen, as far as covered."""
+        level = self._level(uv, cover)
+        low, high = int(np.floor(level.min())), int(np.ceil(level.max()))
+        seen = self._sampled(low, uv)
+        if high > low:
+            full = cv2.resize(level, cover.shape[::-1], interpolation=cv2.INTER_LINEAR)
+        for k in range(low, high):
+            share = np.clip(full - np.float32(k), 0.0, 1.0)
+            seen = cast(Image, cv2.blendLinear(seen, self._sampled(k + 1, uv), 1.0 - share, share))
+        return seen
+
+    def _sampled(self, level: int, uv: Floats) -> Image:
+        picture = self._levels[level]
+        h, w = picture.shape[:2]
+        x, y, wide, tall = self._place
+        scale = np.array((w / wide, h / tall))
+        places = cv2.transform(uv, np.column_stack([np.diag(scale), (0.5 - np.array((x, y))) * scale - 0.5]))
+        return sampled(picture, cast(Floats, places), cv2.BORDER_CONSTANT)
+
+    def _level(self, uv: Floats, cover: Floats) -> Floats:
+        """The level wanted, on a coarse grid: smooth, so that no step between levels is seen."""
+        coarse, inside = uv[::STEP_PX, ::STEP_PX], cover[::STEP_PX, ::STEP_PX] == 1
+        h, w = self._levels[0].shape[:2]
+        texels = coarse * np.array((w / self._place[2], h / self._place[3]), np.float32)
+        wanted, known = np.zeros(inside.shape, np.float32), np.zeros(inside.shape, np.float32)
+        for a, b in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
+            step = np.linalg.norm(texels[b] - texels[a], axis=-1) / STEP_PX
+            both = inside[a] & inside[b]
+            wanted[a] = np.maximum(wanted[a], np.where(both, np.log2(np.maximum(step, 1.0)), 0.0))
+            known[a] = np.maximum(known[a], both)
+        total = cv2.GaussianBlur(wanted * known, (0, 0), 4.0) / np.maximum(cv2.GaussianBlur(known, (0, 0), 4.0), 1e-3)
+        return cast(Floats, np.clip(total - SHARPEN, 0.0, len(self._levels) - 1.0).astype(np.float32))
+
+
+def shrunk(picture: Image, size: tuple[int, int]) -> Image:
+    """The picture in a smaller size (width, height); areas alone would leave a beat of fine stripes."""
+    factors = (picture.shape[1] / size[0], picture.shape[0] / size[1])
+    spread = [SPREAD * factor if factor > 1 else 1e-3 for factor in factors]
+    smooth = cv2.GaussianBlur(picture, (0, 0), sigmaX=spread[0], sigmaY=spread[1])
+    return cast(Image, cv2.resize(smooth, size, interpolation=cv2.INTER_AREA))
+
+
+def first_picture(path: Path) -> Image:
+    """A picture, or a video's first, as (h, w, 4) premultiplied.
+
+    Raises:
+        UsageError: it cannot be read.
+    """
+    with Artwork(path) as artwork:
+        return artwork.at(0.0)
+
+
+def read_picture(path: Path) -> Image:
+    """A picture file as (h, w, 3) BGR or (h, w, 4) with alpha.
+
+    Raises:
+        UsageError: it cannot be read.
+    """
+    try:
+        encoded = np.fromfile(path, np.uint8)
+    except OSError as error:
+        raise UsageError(f"cannot read the texture {path}: {error.strerror}") from error
+    picture = cv2.imdecode(encoded, cv2.IMREAD_UNCHANGED) if encoded.size else None
+    if picture is None:
+        raise UsageError(f"the texture {path} is not a picture that can be read: save it as PNG")
+    if picture.dtype == np.uint16:
+        picture = cv2.convertScaleAbs(picture, alpha=1.0 / 257.0)
+    if picture.dtype != np.uint8:
+        raise UsageError(f"the texture {path} has {picture.dtype} values: save it as PNG with 8 bits a channel")
+    if picture.ndim == 2 or picture.shape[2] == 1:
+        picture = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
+    return cast(Image, picture)
+
+
+def premultiplied(picture: Image) -> Image:
+    """A picture as (h, w, 4): colours multiplied by alpha, so that filtering does not bring hidden colours forth."""
+    if picture.shape[2] == 3:
+        return cast(Image, cv2.cvtColor(picture, cv2.COLOR_BGR2BGRA))
+    alpha = picture[..., 3]
+    colours = [cv2.multiply(picture[..., k], alpha, scale=1.0 / 255.0) for k in range(3)]
+    return cast(Image, cv2.merge([*colours, alpha]))

@@ -1,0 +1,1 @@
+"""The frame loop: read, track, reconstruct, record."""

@@ -1,0 +1,183 @@
+"""What a run or an evaluation collects and puts out: shapes, scores, files."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.terminal.errors import UsageError
+from reconstruction.basis.mesh import Mesh
+from reconstruction.evaluation import Score, followed, score
+from reconstruction.window.model import Model, ShapeEstimate
+from tracking.tracks import Truth
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Collected:
+    """Estimates that are kept: all if they are to be saved, else those of truth frames only.
+
+    Attributes:
+        everything: whether every estimate is kept.
+        truth_frames: source frames whose estimates are kept.
+        estimates: by source frame.
+        lost: source frames without the object, if everything is kept.
+        squared_px: sum of the squared reprojection errors so far.
+        residuals: their number.
+        last_rms_px: of the newest estimate.
+        switches: how often the window took another branch: bent or tilted otherwise.
+    """
+
+    everything: bool
+    truth_frames: frozenset[int] = frozenset()
+    estimates: dict[int, ShapeEstimate] = field(default_factory=dict)
+    lost: list[int] = field(default_factory=list)
+    squared_px: float = 0.0
+    residuals: int = 0
+    last_rms_px: float | None = None
+    switches: int = 0
+
+    def add(self, frame: int, estimate: ShapeEstimate) -> None:
+        """Take one estimate of a source frame."""
+        seen = estimate.residual_px[estimate.visible]
+        squared = float(seen @ seen)
+        self.last_rms_px = float(np.sqrt(squared / len(seen))) if len(seen) else None
+        self.squared_px += squared
+        self.residuals += len(seen)
+        self.switches += estimate.switch is not None
+        if self.everything or frame in self.truth_frames:
+            self.estimates[frame] = estimate
+
+    def lose(self, frame: int) -> None:
+        """Take notice of a source frame in which the object is lost."""
+        if self.everything:
+            self.lost.append(frame)
+
+    @property
+    def reprojection_rms_px(self) -> float | None:
+        """Over all visible points of all frames."""
+        return float(np.sqrt(self.squared_px / self.residuals)) if self.residuals else None
+
+    def score_against(self, truth: Truth, rest: Array, mesh: Mesh) -> Score | None:
+        """Score on truth points followed in the mesh; None if no truth frame has a shape.
+
+        Raises:
+            ReconstructionError: the truth points lie outside the mesh.
+        """
+        chosen = [k for k, frame in enumerate(truth.frames) if int(frame) in self.estimates]
+        if not chosen:
+            return None
+        kept = [self.estimates[int(truth.frames[k])] for k in chosen]
+        shapes, still, inside = followed(
+            [e.shape for e in kept], [e.projection_px for e in kept], rest, mesh, truth.W_px[chosen[0]].T
+        )
+        return score(shapes, still, truth.S[chosen][:, :, inside], truth.frames[chosen])
+
+
+def score_words(result: Score | None) -> dict[str, object]:
+    """A score as it is printed."""
+    if result is None:
+        return {}
+    return {
+        "e3d": result.e3d,
+        "e3d_camera": result.e3d_camera,
+        "e3d_static": result.e3d_static,
+        "e3d_sign_free": result.e3d_sign_free,
+        "truth_points": result.points,
+        "truth_frames": len(result.frames),
+    }
+
+
+def save_shapes(path: Path, estimates: Mapping[int, ShapeEstimate], model: Model, lost: Iterable[int] = ()) -> None:
+    """Write S (F, 3, P) camera axes, pixels; R, s, t, Lambda, faces, visible, frames, and the basis they refer to.
+
+    Frames in which the surface was lost get rows of NaN.
+
+    Raises:
+        UsageError: the file cannot be written.
+    """
+    frames = sorted({*estimates, *lost})
+    nothing = without_shape(next(iter(estimates.values())))
+    rows = [estimates.get(frame, nothing) for frame in frames]
+    basis = model.basis
+    with writable(path) as file:
+        np.savez_compressed(
+            file,
+            S=np.stack([e.shape for e in rows]),
+            R=np.stack([e.R for e in rows]),
+            s=np.array([e.s for e in rows]),
+            t=np.stack([e.t for e in rows]),
+            Lambda=np.stack([e.Lambda for e in rows]),
+            visible=np.stack([e.visible for e in rows]),
+            frames=np.array(frames),
+            faces=model.mesh.faces,
+            rest=basis.rest,
+            Upsilon=basis.Upsilon,
+            eigenvalues=basis.eigenvalues,
+            Phi=basis.Phi,
+            K=model.camera.K,
+            perspective=model.camera.perspective,
+        )
+
+
+def without_shape(like: ShapeEstimate) -> ShapeEstimate:
+    """An estimate of the same size that says nothing: NaN, and no point visible."""
+
+    def nan(value: Array) -> Array:
+        return np.full_like(value, np.nan)
+
+    return ShapeEstimate(
+        frame=-1,
+        quaternion=nan(like.quaternion),
+        R=nan(like.R),
+        t=nan(like.t),
+        s=np.nan,
+        Lambda=nan(like.Lambda),
+        shape=nan(like.shape),
+        projection_px=nan(like.projection_px),
+        residual_px=nan(like.residual_px),
+        visible=np.zeros_like(like.visible),
+    )
+
+
+def check_free(path: Path | None, *, overwrite: bool) -> None:
+    """See to it, before anything is computed, that a file can be written.
+
+    Raises:
+        UsageError: it exists and may not be replaced, or its folder cannot be made.
+    """
+    if path is None:
+        return
+    if path.exists() and not overwrite:
+        raise UsageError(f"{path} exists: replace it with --overwrite, or choose another name")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("ab"):
+            pass
+        if path.stat().st_size == 0:
+            path.unlink()
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror}; choose another place") from error
+
+
+@contextmanager
+def writable(path: Path) -> Iterator[BinaryIO]:
+    """A binary file that appears under its name only when complete.
+
+    Raises:
+        UsageError: the file cannot be written.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        with part.open("wb") as file:
+            yield file
+        part.replace(path)
+    except OSError as error:
+        raise UsageError(f"cannot write {path}: {error.strerror}; free some space or choose another place") from error
+    finally:
+        part.unlink(missing_ok=True)

@@ -1,0 +1,124 @@
+"""Reconstruct given tracks and score them against the truth in their file."""
+
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from app.files.mesh_file import rest_of_vertices
+from app.options.run import Evaluate, Words
+from app.pipeline.estimates import Collected, check_free, save_shapes, score_words
+from app.pipeline.prepare import RECOVERED, settings_of
+from app.terminal.errors import UsageError
+from app.terminal.progress import Progress
+from reconstruction.basis.mesh import Mesh
+from reconstruction.camera import Camera
+from reconstruction.evaluation import score, with_missing, with_noise, with_outliers
+from reconstruction.mapping import rest_shape
+from reconstruction.mapping.rest_shape import RestShape
+from reconstruction.online import Reconstruction
+from tracking.tracks import Tracks
+
+
+def evaluate(config: Evaluate, progress: Progress) -> Words:
+    """Run the reconstruction over a track file.
+
+    Returns:
+        the scores.
+
+    Raises:
+        UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
+    """
+    check_free(config.shapes_out, overwrite=config.overwrite)
+    tracks = Tracks.load(config.tracks)
+    frames, _, points = tracks.W.shape
+    rng = np.random.default_rng(config.seed)
+    W = with_noise(np.where(tracks.visible[:, None], tracks.W, np.nan), config.noise, rng)
+    visible = with_missing(tracks.visible, config.missing, rng)
+    if config.outliers:
+        W = with_outliers(W, tracks.visible, config.outliers, rng)
+    reconstruction = prepare(config, tracks)
+    collected = Collected(everything=True)
+    with threadpool_limits(1), progress:
+        progress.expect(frames)
+        started = perf_counter()
+        estimates = []
+        for w, h in zip(W, visible, strict=True):
+            estimates += reconstruction.update(np.where(h, w, np.nan), h)
+            progress.advance(reconstruction.phase.value)
+        estimates += reconstruction.finish()
+        elapsed_ms = (perf_counter() - started) * 1e3
+    for estimate in estimates:
+        collected.add(estimate.frame, estimate)
+    rest = reconstruction.rest
+    assert rest is not None
+    if config.shapes_out:
+        save_shapes(config.shapes_out, collected.estimates, reconstruction.model)
+    words: Words = {
+        "tracks": str(config.tracks),
+        "frames": frames,
+        "points": points,
+        "modes": config.model.modes,
+        "rest_shape": rest.kind,
+        "rest_shape_note": rest.note,
+        **reconstruction.focal_words,
+        "bootstrap_frames": reconstruction.bootstrap_frames,
+        "deformation": reconstruction.deformation,
+        "metric": reconstruction.metric,
+        "priors": reconstruction.weights,
+        "branch_switches": collected.switches,
+        "reprojection_rms": collected.reprojection_rms_px,
+        "ms_per_frame": elapsed_ms / frames,
+    }
+    if tracks.S_gt is not None and tracks.gt_frames is not None:
+        shapes = np.stack([collected.estimates[int(f)].shape for f in tracks.gt_frames])
+        words |= score_words(score(shapes, rest.motion.shape, tracks.S_gt, tracks.gt_frames))
+    return words
+
+
+def prepare(config: Evaluate, tracks: Tracks) -> Reconstruction:
+    """The estimator for given tracks, before their first frame.
+
+    Raises:
+        UsageError: no such rest shape or camera in the file.
+    """
+    given, mesh = given_rest_shape(config, tracks)
+    settings = settings_of(config.model, config.rest_shape)
+    return Reconstruction(camera_of(config, tracks), settings, given, mesh)
+
+
+def given_rest_shape(config: Evaluate, tracks: Tracks) -> tuple[RestShape | None, Mesh | None]:
+    """The rest shape from the truth or a file, if that is what was asked for.
+
+    Raises:
+        UsageError: the file has no truth, or the mesh does not fit.
+    """
+    if config.rest_shape in RECOVERED:
+        return None, None
+    if config.rest_shape == "first-truth":
+        if tracks.S_gt is None:
+            raise UsageError(f"{config.tracks} has no true shapes S_gt: choose another --rest-shape")
+        return rest_shape.given(tracks.S_gt[0], "truth", "first true shape"), None
+    return rest_of_vertices(Path(config.rest_shape), tracks.W.shape[2])
+
+
+def camera_of(config: Evaluate, tracks: Tracks) -> Camera:
+    """The camera asked for, from the file's K and the options.
+
+    Raises:
+        UsageError: perspective without a focal length.
+    """
+    focal, K = config.model.focal, tracks.K
+    if config.camera == "orthographic" or (config.camera == "auto" and K is None and focal is None):
+        return Camera()
+    if K is not None:
+        camera = Camera(float(K[0, 0]), K[:2, 2].copy())
+        return replace(camera, focal_px=focal) if isinstance(focal, float) else camera
+    if focal is None:
+        raise UsageError(f"{config.tracks} has no K: give --focal, or --camera orthographic")
+    seen = np.where(tracks.visible[:, None], tracks.W, np.nan)
+    if focal == "auto":  # pictures are about as wide as what moves in them
+        focal = float(np.nanmax(seen[:, 0]) - np.nanmin(seen[:, 0]))
+    return Camera(focal, np.nanmean(seen, axis=(0, 2)))

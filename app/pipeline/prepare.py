@@ -1,0 +1,58 @@
+"""What a run begins with: the points of the first frame, and the estimator with the camera they are seen by."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal, cast
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.files.mesh_file import rest_of_surface
+from app.options.model import Model
+from app.options.run import Run
+from reconstruction.camera import Camera
+from reconstruction.online import Reconstruction, Settings
+from tracking.features import detect_corners
+from tracking.region import region_mask
+from tracking.video import Frame
+
+Array = NDArray[np.float64]
+
+RECOVERED = ("auto", "rigid", "plane")  # rest shapes that come from the first frames
+
+
+def prepared(config: Run, first: Frame) -> tuple[Array, Reconstruction]:
+    """Corners (P, 2) px of the first frame, and the estimator before it has seen one.
+
+    Raises:
+        UsageError, TrackingError: a region, mask or mesh that does not fit the picture, or too few corners.
+    """
+    height, width = first.image.shape[:2]
+    region = region_mask((width, height), config.roi, config.mask)
+    gray = cast(NDArray[np.uint8], cv2.cvtColor(first.image, cv2.COLOR_BGR2GRAY))
+    points_px = detect_corners(gray, region, config.points)
+    model = config.model
+    focal = model.focal if isinstance(model.focal, float) else float(width)
+    camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
+    settings = replace(settings_of(model, config.rest_shape), estimate_focal=not isinstance(model.focal, float))
+    if config.rest_shape in RECOVERED:
+        return points_px, Reconstruction(camera, settings)
+    given, inside = rest_of_surface(Path(config.rest_shape), points_px, camera)
+    return points_px[inside], Reconstruction(camera, settings, given)
+
+
+def settings_of(model: Model, rest_shape: str) -> Settings:
+    """The estimator's settings; a rest shape that is not to be recovered is given to it."""
+    return Settings(
+        rest_shape=cast(Literal["auto", "rigid", "plane"], rest_shape if rest_shape in RECOVERED else "auto"),
+        bootstrap_frames=None if model.bootstrap_frames == "auto" else model.bootstrap_frames,
+        modes=model.modes,
+        metric=model.metric,
+        deformation=model.deformation,
+        window=model.window,
+        energy=model.energy,
+        priors=model.weights,
+        refine_rest=model.refine_rest,
+        estimate_focal=model.focal == "auto",
+    )

@@ -1,0 +1,147 @@
+"""One object of a run: its points, who follows them, who makes shapes of them, and what is kept of it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from app.options.run import Run, Words
+from app.pipeline.estimates import Collected, save_shapes, score_words
+from app.pipeline.prepare import prepared
+from app.pipeline.stopwatch import Stopwatch
+from reconstruction.online import Phase
+from reconstruction.window.model import ShapeEstimate
+from tracking.guarded import Change, Guarded, GuardedTracker
+from tracking.klt import Observation
+from tracking.tracks import Tracks, Truth
+from tracking.video import Frame
+
+
+@dataclass(frozen=True)
+class Settled:
+    """The shape of a frame, once it is known."""
+
+    index: int
+    time_s: float
+    estimate: ShapeEstimate
+
+
+class Take:
+    """One object, followed from a frame that shows it.
+
+    Args:
+        config: what the person asked for.
+        first: that frame.
+        watch: to time it.
+
+    Attributes:
+        config, first: the same.
+        points_px: (P, 2) its points in the first frame.
+        reconstruction: its estimator.
+        collected: its estimates.
+
+    Raises:
+        UsageError, TrackingError: a region, mask, mesh or truth that does not fit, or too few corners.
+    """
+
+    def __init__(self, config: Run, first: Frame, watch: Stopwatch) -> None:
+        self.config, self.first, self._watch = config, first, watch
+        self._truth = Truth.load(config.ground_truth) if config.ground_truth else None
+        truth_frames = frozenset(self._truth.frames.tolist()) if self._truth else frozenset()
+        self.collected = Collected(config.output.shapes_out is not None, truth_frames)
+        self.points_px, self.reconstruction = prepared(config, first)
+        self._tracker = GuardedTracker(first.image, self.points_px)
+        self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
+        self._tracks: list[Observation] = []
+
+    @property
+    def lost(self) -> bool:
+        """Whether the object is lost."""
+        return self._tracker.lost
+
+    @property
+    def phase(self) -> Phase:
+        """What is being done about it."""
+        return Phase.LOST if self.lost else self.reconstruction.phase
+
+    def begin(self, frame: Frame) -> None:
+        """Do what can be done early with the next frame, in another thread."""
+        self._tracker.begin(frame.image)
+
+    def follow(self, frame: Frame) -> Guarded:
+        """Find the points in the next frame, or in the first."""
+        if frame is self.first:
+            return Guarded(Observation(self.points_px, np.ones(len(self.points_px), np.bool_)))
+        with self._watch.time("track"):
+            guarded = self._tracker.track(frame.image, self.reconstruction.predict())
+        if guarded.change is Change.RECOVERED:  # nothing ties it to where it was
+            self.reconstruction.restart()
+        return guarded
+
+    def shape(self, frame: Frame, observation: Observation) -> list[Settled]:
+        """The shapes known with this frame, oldest first; none while the object is lost: better than a wrong one.
+
+        Raises:
+            ReconstructionError: no rest shape can be had.
+        """
+        if self.config.output.tracks_out:
+            self._tracks.append(observation)
+        if self.lost:
+            self.collected.lose(frame.index)
+            return []
+        self._times[frame.index] = frame.time_s
+        with self._watch.time("reconstruct"):
+            return self._settled(self.reconstruction.update(observation.points_px.T, observation.visible))
+
+    def finish(self) -> list[Settled]:
+        """No more frames: settle for what the bootstrap has.
+
+        Raises:
+            ReconstructionError: it has too little.
+        """
+        with self._watch.time("reconstruct"):
+            return self._settled(self.reconstruction.finish())
+
+    @property
+    def words(self) -> Words:
+        """For the summary."""
+        rest = self.reconstruction.rest
+        words: Words = {
+            "points": len(self.points_px),
+            "rest_shape": rest.kind if rest else None,
+            "rest_shape_note": rest.note if rest else None,
+            "bootstrap_frames": self.reconstruction.bootstrap_frames,
+            "deformation": self.reconstruction.deformation,
+            "metric": self.reconstruction.metric,
+            "priors": self.reconstruction.weights,
+            **self.reconstruction.focal_words,
+            "branch_switches": self.collected.switches,
+            "reprojection_rms_px": self.collected.reprojection_rms_px,
+        }
+        if self._truth and rest:
+            mesh = self.reconstruction.model.mesh
+            words |= score_words(self.collected.score_against(self._truth, rest.motion.shape, mesh))
+        return words
+
+    def save(self) -> None:
+        """Write the files asked for.
+
+        Raises:
+            UsageError: one cannot be written.
+        """
+        output = self.config.output
+        if output.tracks_out and self._tracks:
+            W = np.stack([o.points_px.T for o in self._tracks])
+            visible = np.stack([o.visible for o in self._tracks])
+            camera = self.reconstruction.camera
+            Tracks(W, visible, K=camera.K if camera.perspective else None).save(output.tracks_out)
+        if output.shapes_out and self.collected.estimates:
+            save_shapes(output.shapes_out, self.collected.estimates, self.reconstruction.model, self.collected.lost)
+
+    def _settled(self, estimates: list[ShapeEstimate]) -> list[Settled]:
+        """Estimates with the oldest frames that wait for one."""
+        settled = []
+        for estimate in estimates:
+            index = next(iter(self._times))
+            settled.append(Settled(index, self._times.pop(index), estimate))
+            self.collected.add(index, estimate)
+        return settled

@@ -1,0 +1,1 @@
+"""Reading a recording: as data, as measures, as plots, tables and overlays."""

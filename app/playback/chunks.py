@@ -1,0 +1,185 @@
+"""Reading a recording's file row by row: complete, of a killed run, or cut off."""
+
+import struct
+import warnings
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from operator import attrgetter
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+from typing import BinaryIO
+
+import numpy as np
+import pyarrow as pa  # type: ignore[import-untyped]
+from numpy.typing import NDArray
+from rerun.chunk import Chunk, RrdReader, StoreEntry
+
+from app.recording import entities
+from app.terminal.errors import UsageError
+
+STATIC = -1  # the frame of what belongs to no frame
+ROW_ID = "rerun.controls.RowId"
+
+STREAM_HEADER = 12  # bytes: RRF2, version, options
+MESSAGE_HEADER = struct.Struct("<QQ")  # kind, length of what follows
+END_MESSAGE = 0
+LAST_KIND = 3
+
+
+@dataclass(frozen=True)
+class Row:
+    """One value of one component.
+
+    Attributes:
+        id: sorts in the order of logging.
+        frame: number of the frame in its source; STATIC for static data.
+        time_s: of the frame.
+        value: an array (n, ...) of the row's instances; of texts and records a list; of a blob its bytes.
+    """
+
+    id: bytes
+    frame: int
+    time_s: float
+    value: object
+
+
+@dataclass
+class Rows:
+    """Rows by entity and component, in the order of logging."""
+
+    found: dict[tuple[str, str], list[Row]] = field(default_factory=lambda: defaultdict(list))
+
+    def all(self, entity: str, component: str) -> list[Row]:
+        """Every row."""
+        return sorted(self.found.get((entity, component), []), key=attrgetter("id"))
+
+    def last(self, entity: str, component: str) -> dict[int, Row]:
+        """By frame: of several rows of a frame the one that was logged last."""
+        return {row.frame: row for row in self.all(entity, component)}
+
+    def static(self, entity: str, component: str) -> object:
+        """A static value.
+
+        Raises:
+            KeyError: there is none.
+        """
+        return self.last(entity, component)[STATIC].value
+
+
+class RecordingFile:
+    """A recording on disk; an iterable of its chunks, which are read one at a time.
+
+    Args:
+        path: the .rrd file.
+
+    Attributes:
+        path: as given.
+        cut_off: whether it ends in the middle of a message; what is complete is read.
+
+    Raises:
+        UsageError: it is missing, not a recording, or not one of ours.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.cut_off = False
+        if not path.is_file():
+            raise UsageError(f"there is no recording {path}: make one with `modeshape run`")
+        with path.open("rb") as file:
+            if file.read(3) != b"RRF":
+                raise UsageError(f"{path} is not a recording: give an .rrd file that `modeshape run` wrote")
+        try:
+            self._open(path)
+        except RuntimeError:
+            self._rescue()
+
+    def __iter__(self) -> Iterator[Chunk]:
+        try:
+            yield from self._reader.stream(store=self._store)
+        except RuntimeError as error:
+            raise UsageError(f"{self.path} is damaged ({error}): run again to make another") from error
+
+    def rows(self, wanted: Callable[[str, str], bool]) -> Rows:
+        """The rows of all wanted (entity, component); entities are named without a leading slash."""
+        rows = Rows()
+        for chunk in self:
+            entity = chunk.entity_path.lstrip("/")
+            batch = chunk.to_record_batch()
+            for component in batch.schema.names:
+                if wanted(entity, component):
+                    rows.found[entity, component] += column_rows(batch, component)
+        return rows
+
+    def _open(self, path: Path) -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # a killed run has no footer, and can be read all the same
+            self._reader = RrdReader(path)
+            stores = self._reader.recordings()
+        self._store = self._ours(stores)
+
+    def _ours(self, stores: list[StoreEntry]) -> StoreEntry:
+        for store in stores:
+            if store.application_id == entities.APPLICATION:
+                return store
+        if not stores:
+            raise UsageError(f"{self.path} contains no recording: give an .rrd file that `modeshape run` wrote")
+        raise UsageError(
+            f"{self.path} is a recording of another application ({stores[0].application_id}): "
+            "give an .rrd file that `modeshape run` wrote"
+        )
+
+    def _rescue(self) -> None:
+        """Read the complete messages of a file that ends in the middle of one, from a copy."""
+        self._part = NamedTemporaryFile(suffix=".rrd")  # noqa: SIM115 (goes when this object goes)
+        try:
+            with self.path.open("rb") as source:
+                left = complete_bytes(source, self.path.stat().st_size)
+                source.seek(0)
+                while block := source.read(min(left, 2**20)):
+                    self._part.write(block)
+                    left -= len(block)
+            self._part.flush()
+        except OSError as error:
+            raise UsageError(f"cannot read {self.path}: {error.strerror}") from error
+        try:
+            self._open(Path(self._part.name))
+        except RuntimeError as error:
+            raise UsageError(f"{self.path} is damaged ({error}): run again to make another") from error
+        self.cut_off = True
+
+
+def complete_bytes(file: BinaryIO, size: int) -> int:
+    """Length of the beginning of a file of `size` bytes that consists of complete messages with data."""
+    position = STREAM_HEADER
+    while position + MESSAGE_HEADER.size <= size:
+        file.seek(position)
+        kind, length = MESSAGE_HEADER.unpack(file.read(MESSAGE_HEADER.size))
+        following = position + MESSAGE_HEADER.size + length
+        if kind == END_MESSAGE or kind > LAST_KIND or following > size:
+            break
+        position = following
+    return min(position, size)
+
+
+def column_rows(batch: pa.RecordBatch, component: str) -> list[Row]:
+    """The rows of a batch that have a value of a component."""
+    count = batch.num_rows
+    names = batch.schema.names
+    frames = batch.column(entities.FRAME).to_pylist() if entities.FRAME in names else [STATIC] * count
+    times = batch.column(entities.TIME).cast(pa.int64()).to_numpy() / 1e9 if entities.TIME in names else np.zeros(count)
+    column, ids = batch.column(component), batch.column(ROW_ID).to_pylist()
+    return [Row(ids[k], frames[k], float(times[k]), cell(column[k].values)) for k in range(count) if column[k].is_valid]
+
+
+def cell(instances: pa.Array) -> object:
+    """The instances of one row: an array, a list of texts or records, or the bytes of a blob."""
+    kind = instances.type
+    if pa.types.is_string(kind) or pa.types.is_struct(kind):
+        return instances.to_pylist()
+    if pa.types.is_list(kind):
+        return instances.flatten().to_numpy().tobytes()
+    if pa.types.is_fixed_size_list(kind):
+        return instances.flatten().to_numpy().reshape(-1, kind.list_size).copy()
+    values: NDArray[np.generic] = instances.to_numpy(zero_copy_only=False)
+    return values.copy()

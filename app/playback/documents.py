@@ -1,0 +1,42 @@
+"""The words of a recording: documents, events, and names."""
+
+import json
+from typing import cast
+
+from app.playback.chunks import STATIC, Rows
+from app.recording import entities
+
+DOCUMENT = "modeshape.Document:"
+NAME = ("__properties", "RecordingInfo:name")
+SCALARS = "Scalars:scalars"
+STAGES = ("decode", "track", "reconstruct", "record")  # in this order, before any others
+
+
+def document(rows: Rows, entity: str) -> tuple[dict[str, object] | None, str]:
+    """A document, None if it is not there, and the version of modeshape that wrote it."""
+    texts = rows.last(entity, f"{DOCUMENT}json")
+    if STATIC not in texts:
+        return None, "unknown"
+    version = cast(list[str], rows.static(entity, f"{DOCUMENT}version"))[0]
+    return json.loads(cast(list[str], texts[STATIC].value)[0]), version
+
+
+def events(rows: Rows) -> list[tuple[int, float, str, str]]:
+    """Frame, time in seconds, level and text of what happened."""
+    levels = {row.id: cast(list[str], row.value)[0] for row in rows.all(entities.EVENTS, "TextLog:level")}
+    return [
+        (row.frame, row.time_s, levels.get(row.id, "INFO"), cast(list[str], row.value)[0])
+        for row in rows.all(entities.EVENTS, "TextLog:text")
+    ]
+
+
+def recording_name(rows: Rows) -> str | None:
+    """What viewers call the recording."""
+    names = rows.last(*NAME)
+    return cast(list[str], names[STATIC].value)[0] if STATIC in names else None
+
+
+def stages(rows: Rows) -> list[str]:
+    """Names of the stages whose time was taken."""
+    found = [e.split("/", 1)[1] for e, c in rows.found if e.startswith(f"{entities.TIMING}/") and c == SCALARS]
+    return sorted(found, key=lambda stage: STAGES.index(stage) if stage in STAGES else len(STAGES))

@@ -1,0 +1,63 @@
+"""The model of a recording, with its texture."""
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.playback.chunks import Rows
+from app.recording import entities
+from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.modes import ModalBasis
+from reconstruction.camera import Camera
+from reconstruction.window.model import Model
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+MODEL = "modeshape.Model:"
+TEXTURE = "Mesh3D:albedo_texture_"
+
+
+@dataclass(frozen=True)
+class Modelled:
+    """The part of a recording that is there once the bootstrap is over.
+
+    Attributes:
+        model: rest shape, modes, mesh and camera.
+        size: (width, height) of the picture, px.
+        texture_px: (P, 2) the vertices in the first frame.
+        texture_bgr: (h, w, 3) the part of the first frame that they cover.
+        texture_origin: (2,) px of that part in the frame.
+    """
+
+    model: Model
+    size: tuple[int, int]
+    texture_px: Array
+    texture_bgr: Image
+    texture_origin: NDArray[np.int64]
+
+
+def modelled_part(rows: Rows) -> Modelled | None:
+    """Model and texture, or None if the recording does not have both."""
+    if not rows.last(entities.MODEL, f"{MODEL}rest") or not rows.last(entities.MESH, f"{TEXTURE}buffer"):
+        return None
+
+    def value(name: str) -> Array:
+        return cast(Array, rows.static(entities.MODEL, f"{MODEL}{name}"))
+
+    rest = value("rest").reshape(3, -1)
+    basis = ModalBasis(rest, value("Upsilon").reshape(-1, rest.shape[1]), value("eigenvalues"), value("Phi").reshape(3, 3))
+    faces, edges = (value(name).reshape(-1, width).astype(np.int64) for name, width in (("faces", 3), ("edges", 2)))
+    camera = Camera(float(value("focal_px")[0]), value("center_px"))
+    layout = cast(list[dict[str, int]], rows.static(entities.MESH, f"{TEXTURE}format"))[0]
+    rgb = np.frombuffer(cast(bytes, rows.static(entities.MESH, f"{TEXTURE}buffer")), np.uint8)
+    width, height = value("size").astype(int).tolist()
+    return Modelled(
+        model=Model(basis, Mesh(faces, edges), camera),
+        size=(width, height),
+        texture_px=value("texture_px").reshape(-1, 2),
+        texture_bgr=rgb.reshape(layout["height"], layout["width"], 3)[:, :, ::-1].copy(),
+        texture_origin=value("texture_origin").astype(np.int64),
+    )

@@ -1,0 +1,241 @@
+"""A recording as data again: what `modeshape review`, `retexture` and `export` work from.
+
+What is written where is listed in `app.recording.entities`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Self, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.playback.chunks import RecordingFile
+from app.playback.documents import DOCUMENT, NAME, SCALARS, document, events, recording_name, stages
+from app.playback.images import stored_images
+from app.playback.model import MODEL, TEXTURE, Modelled, modelled_part
+from app.playback.observations import OBSERVATION, POSITIONS, observed_part
+from app.recording import entities
+from app.terminal.errors import UsageError
+from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.modes import ModalBasis
+from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.state import State
+from reconstruction.window.model import Model, ShapeEstimate
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+
+ESTIMATE = "modeshape.Estimate:"
+
+
+@dataclass(frozen=True)
+class Playback:
+    """A recording; F frames, P points, r modes.
+
+    Attributes:
+        path: its file.
+        name: what viewers call it.
+        version: of the modeshape that wrote it.
+        configuration: what the run was asked to do.
+        summary: what came out of the run; None if it was cut off.
+        notes: what is missing in the recording, in words for a person; usually none.
+        frames: (F,) numbers of the frames in their source.
+        times_s: (F,) their times.
+        phases: (F) phase of the run at each.
+        stage_ms: by stage, (F,) milliseconds, NaN where there are none.
+        events: (frame, time_s, level, text) of what happened.
+        W: (F, 2, P) observed px, NaN where not visible.
+        visible: (F, P) whether a point was seen.
+        quaternion: (F, 4) w first; NaN in frames without a shape, as for all that follow.
+        t: (F, 2) px.
+        s: (F,).
+        Lambda: (F, 3, r) px; r = 0 without a model.
+        modelled: what is known once the bootstrap is over; None if the run ended before.
+    """
+
+    path: Path
+    name: str
+    version: str
+    configuration: dict[str, object]
+    summary: dict[str, object] | None
+    notes: tuple[str, ...]
+    frames: NDArray[np.int64]
+    times_s: Array
+    phases: list[str]
+    stage_ms: dict[str, Array]
+    events: list[tuple[int, float, str, str]]
+    W: Array
+    visible: NDArray[np.bool_]
+    quaternion: Array
+    t: Array
+    s: Array
+    Lambda: Array
+    modelled: Modelled | None
+    file: RecordingFile
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read a recording: complete, of a run that was killed, or cut off.
+
+        Raises:
+            UsageError: it is missing, not a recording, not one of ours, or without a single frame.
+        """
+        file = RecordingFile(path)
+        try:
+            return cls._of(file)
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            if isinstance(error, UsageError):
+                raise
+            raise UsageError(
+                f"{path} is not a recording that this version of modeshape can read ({error!r}): run again to make one"
+            ) from error
+
+    @classmethod
+    def _of(cls, file: RecordingFile) -> Self:
+        rows = file.rows(wanted)
+        observed = observed_part(rows)
+        if observed is None:
+            raise UsageError(f"{file.path} contains no frame: the run ended before its first, or its start was lost")
+        modelled = modelled_part(rows)
+        modes = len(modelled.model.basis.eigenvalues) if modelled else 0
+        numbers = observed.frames.tolist()
+
+        def by_frame(entity: str, component: str, width: int) -> Array:
+            values, found = np.full((len(numbers), width), np.nan), rows.last(entity, component)
+            for i, frame in enumerate(numbers):
+                if frame in found:
+                    values[i] = cast(Array, found[frame].value)
+            return values
+
+        configuration, version = document(rows, entities.CONFIGURATION)
+        summary = document(rows, entities.SUMMARY)[0]
+        notes = []
+        if file.cut_off:
+            notes.append(f"{file.path} is cut off: {len(numbers)} frames, up to number {numbers[-1]}, could be read")
+        elif summary is None:
+            notes.append(f"{file.path} is of a run that was ended before it was complete: it has no summary")
+        if modelled is None:
+            notes.append(f"{file.path} contains no shapes: the run ended before its rest shape was found")
+        return cls(
+            path=file.path,
+            name=recording_name(rows) or file.path.stem,
+            version=version,
+            configuration=configuration or {},
+            summary=summary,
+            notes=tuple(notes),
+            frames=observed.frames,
+            times_s=observed.times_s,
+            phases=observed.phases,
+            stage_ms={stage: by_frame(f"{entities.TIMING}/{stage}", SCALARS, 1)[:, 0] for stage in stages(rows)},
+            events=events(rows),
+            W=observed.W,
+            visible=observed.visible,
+            quaternion=by_frame(entities.ESTIMATE, f"{ESTIMATE}quaternion", 4),
+            t=by_frame(entities.ESTIMATE, f"{ESTIMATE}t", 2),
+            s=by_frame(entities.ESTIMATE, f"{ESTIMATE}s", 1)[:, 0],
+            Lambda=by_frame(entities.ESTIMATE, f"{ESTIMATE}Lambda", 3 * modes).reshape(len(numbers), 3, modes),
+            modelled=modelled,
+            file=file,
+        )
+
+    def need_model(self) -> Model:
+        """Rest shape, modes, mesh and camera together.
+
+        Raises:
+            UsageError: the run ended before there was a model.
+        """
+        return self._need().model
+
+    @property
+    def basis(self) -> ModalBasis:
+        """Rest shape and modes; this and the following raise UsageError if the run ended before there was a model."""
+        return self._need().model.basis
+
+    @property
+    def mesh(self) -> Mesh:
+        """Connectivity of the points."""
+        return self._need().model.mesh
+
+    @property
+    def camera(self) -> Camera:
+        """The camera."""
+        return self._need().model.camera
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """(width, height) of the picture, px."""
+        return self._need().size
+
+    @property
+    def texture_px(self) -> Array:
+        """The vertices (P, 2) px in the first frame."""
+        return self._need().texture_px
+
+    @property
+    def texture_bgr(self) -> Image:
+        """The part (h, w, 3) of the first frame that the vertices cover."""
+        return self._need().texture_bgr
+
+    @property
+    def texture_origin(self) -> NDArray[np.int64]:
+        """Where (2,) px that part is in the first frame."""
+        return self._need().texture_origin
+
+    @cached_property
+    def shaped(self) -> NDArray[np.bool_]:
+        """Which frames (F,) have a shape."""
+        return np.asarray(np.isfinite(self.s))
+
+    def estimate(self, i: int) -> ShapeEstimate | None:
+        """Shape and pose of the frame in row i; None if it has none.
+
+        Raises:
+            UsageError: the run ended before there was a model.
+        """
+        model = self.need_model()
+        if not self.shaped[i]:
+            return None
+        q = quaternion_from_rotation(rotation_from_quaternion(self.quaternion[i]) @ model.basis.Phi)
+        t, log_s = self.t[i] / model.radius, np.log(self.s[i])
+        state = State(q[None], t[None], np.array([log_s]), self.Lambda[i][None] / model.unit)
+        return model.estimate(i, self.W[i], self.visible[i], state)
+
+    def shapes(self) -> Array:
+        """All shapes (F, 3, P) in camera axes, pixels of the first frame; NaN in frames without one.
+
+        Raises:
+            UsageError: the run ended before there was a model.
+        """
+        shapes = np.full((len(self.frames), 3, self.basis.rest.shape[1]), np.nan)
+        for i in np.flatnonzero(self.shaped):
+            estimate = self.estimate(int(i))
+            assert estimate is not None
+            shapes[i] = estimate.shape
+        return shapes
+
+    def images(self) -> Iterator[tuple[int, Image | None]]:
+        """Row and picture (H, W, 3) BGR of every frame, decoded one at a time; None where there is none."""
+        return stored_images(self.file, self.frames.tolist())
+
+    def _need(self) -> Modelled:
+        if self.modelled is None:
+            raise UsageError(
+                f"{self.path} contains no model: the run ended before its rest shape was found; "
+                "run again for longer, or with --rest-shape plane"
+            )
+        return self.modelled
+
+
+def wanted(entity: str, component: str) -> bool:
+    """What is kept in memory: everything but pictures and what the estimates are drawn with."""
+    if entity == entities.MESH:
+        return component.startswith(TEXTURE)
+    if entity == entities.SEEN:
+        return component == POSITIONS
+    if entity.startswith(entities.TIMING):
+        return component == SCALARS
+    ours = (MODEL, ESTIMATE, OBSERVATION, DOCUMENT, "TextLog:")
+    return (entity, component) == NAME or component.startswith(ours)

@@ -1,0 +1,57 @@
+"""Pictures as a recording stores them: frames as JPEG, the video file as it is, the mesh's texture."""
+
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from app.terminal.errors import UsageError
+
+Image = NDArray[np.uint8]
+
+JPEG_QUALITY = 85
+
+
+def jpeg(image: Image) -> rr.EncodedImage:
+    """An image (H, W, 3) BGR, compressed."""
+    encoded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
+    return rr.EncodedImage(contents=encoded.tobytes(), media_type="image/jpeg")
+
+
+def embedded_video(video: Path | None) -> tuple[rr.AssetVideo, NDArray[np.int64]]:
+    """A video file as it is, and its frames' time stamps (F,) in nanoseconds.
+
+    Raises:
+        UsageError: not a file, or not a container and codec that Rerun knows.
+    """
+    if video is None or not video.is_file():
+        raise UsageError("--image video needs a video file as the source: use --image jpeg")
+    try:
+        asset = rr.AssetVideo(path=video)
+        return asset, np.sort(np.asarray(asset.read_frame_timestamps_nanos(), np.int64))
+    except (RuntimeError, ValueError, OSError) as error:
+        raise UsageError(f"--image video cannot store {video} ({error}): use --image jpeg") from error
+
+
+def cropped(image: Image, points_px: NDArray[np.float64]) -> tuple[Image, NDArray[np.int64]]:
+    """The part of an image (H, W, 3) that points (p, 2) cover, 2 px wider, and its origin (2,) there."""
+    size = np.array(image.shape[1::-1])
+    low = np.clip(np.floor(points_px.min(axis=0)).astype(np.int64) - 2, 0, size - 1)
+    high = np.clip(np.ceil(points_px.max(axis=0)).astype(np.int64) + 3, low + 1, size)
+    return image[low[1] : high[1], low[0] : high[0]], low
+
+
+def texture(crop: Image, points_px: NDArray[np.float64], faces: NDArray[np.int64]) -> rr.Mesh3D:
+    """Triangles (m, 3) and their texture, of an image (h, w, 3) BGR and the vertices' pixels (p, 2) in it."""
+    height, width = crop.shape[:2]
+    model: Literal["RGB"] = "RGB"
+    return rr.Mesh3D.from_fields(
+        triangle_indices=faces.astype(np.uint32),
+        # Without normals the viewer does not light the mesh: the texture keeps its colours, from both sides.
+        vertex_texcoords=((points_px + 0.5) / (width, height)).astype(np.float32),  # pixel centres are at .5 there
+        albedo_texture_buffer=cv2.cvtColor(crop, cv2.COLOR_BGR2RGB).tobytes(),
+        albedo_texture_format=rr.components.ImageFormat(width, height, color_model=model, channel_datatype="U8"),
+    )

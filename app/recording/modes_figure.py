@@ -1,0 +1,177 @@
+"""The mode shapes of a rest shape as a figure (paper's Fig. 2): each mode along each principal axis, and the spectrum."""
+
+from dataclasses import dataclass
+from io import BytesIO
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import TriMesh
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
+from numpy.typing import NDArray
+
+from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.modes import ModalBasis
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+COLUMNS = 5
+DPI, SMALL_DPI = 150, 100
+PANEL_INCHES = 1.9
+LEFT, SPECTRUM, TOP, BOTTOM = 1.25, 4.1, 0.85, 0.4  # inches around the panels
+AMPLITUDE = 0.18  # largest displacement, as a share of the rest shape's length
+TURN_DEGREES, TILT_DEGREES = 32.0, 28.0  # of the view against the first frame's camera: neither frontal nor from the side
+LIGHT = np.array([-0.45, -0.65, -0.62])  # from the upper left, behind the eye
+AXES_WORDS = (
+    ("$\\Gamma_\\alpha$", "in the plane,\nlengthwise"),
+    ("$\\Gamma_\\beta$", "in the plane,\nacross"),
+    ("$\\Gamma_\\tau$", "out of\nthe plane"),
+)
+INK, FAINT, GHOST = "#22262e", "#8a919e", "#b9bfca"
+MOVEMENT = LinearSegmentedColormap.from_list("movement", ["#2f6fb7", "#86b6e0", "#e9e7e2", "#f2a978", "#c8502d"])
+
+
+@dataclass(frozen=True)
+class View:
+    """A parallel projection onto the paper: rows of `axes` (3, 3) are its right, its down and away from the eye."""
+
+    axes: Array
+
+    @classmethod
+    def three_quarter(cls) -> "View":
+        """The first frame's camera, moved to the side and up."""
+        turn, tilt = np.deg2rad(TURN_DEGREES), np.deg2rad(TILT_DEGREES)
+        c, s = np.cos(turn), np.sin(turn)
+        about_y = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+        c, s = np.cos(tilt), np.sin(tilt)
+        about_x = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
+        return cls(about_x @ about_y)
+
+    def flat(self, shape: Array) -> Array:
+        """Points (p, 2) on paper, y up, of a shape (3, p)."""
+        right, down, _ = self.axes @ shape
+        return np.column_stack([right, -down])
+
+
+def modes_figure(
+    basis: ModalBasis, mesh: Mesh, spectrum: Array, *, title: str, columns: int = COLUMNS, jpeg: bool = False
+) -> bytes:
+    """The leading modes under Γ_α, Γ_β, Γ_τ (rows) and the eigenvalues `spectrum` (n,), descending, n >= r.
+
+    Returns:
+        a PNG, or a smaller picture as a JPEG.
+    """
+    columns = min(columns, len(basis.eigenvalues))
+    view = View.three_quarter()
+    length = float(np.ptp(basis.Phi[:, 0] @ basis.rest))
+    frame = limits(basis, view, length, columns)
+    panel = PANEL_INCHES * np.array([np.ptp(frame[0]), np.ptp(frame[1])]) / np.sqrt(np.ptp(frame[0]) * np.ptp(frame[1]))
+    width, height = panel * (columns, 3) + (LEFT + SPECTRUM, TOP + BOTTOM)
+    figure = Figure(figsize=(width, height), facecolor="white", dpi=SMALL_DPI if jpeg else DPI)
+    FigureCanvasAgg(figure)
+
+    def place(x: float, y: float, w: float, h: float) -> tuple[float, float, float, float]:
+        return x / width, y / height, w / width, h / height
+
+    rim = boundary(mesh.faces)
+    for row, (symbol, words) in enumerate(AXES_WORDS):
+        bottom = BOTTOM + (2 - row) * panel[1]
+        for column in range(columns):
+            axes = figure.add_axes(place(LEFT + column * panel[0], bottom, *panel))
+            draw_mode(axes, basis, mesh, rim, view, row, column, length)
+            axes.set(xlim=frame[0], ylim=frame[1])
+            axes.set_axis_off()
+            if row == 0:
+                axes.set_title(f"mode {column + 1}", fontsize=11, color=INK, pad=2)
+        x, y, *_ = place(0.18, bottom + panel[1] / 2, 0, 0)
+        figure.text(x, y, symbol, fontsize=20, color=INK, va="bottom")
+        figure.text(x, y - 0.06 / height, words, fontsize=8, color=FAINT, va="top", linespacing=1.3)
+    right = LEFT + columns * panel[0]
+    draw_spectrum(
+        figure.add_axes(place(right + 0.75, BOTTOM + 0.35, SPECTRUM - 1.0, 3 * panel[1] - 0.45)),
+        basis.eigenvalues,
+        spectrum,
+    )
+    figure.text(0.18 / width, 1 - 0.3 / height, title, fontsize=13, color=INK, va="center")
+    key = "color: the mode's value at a point, from negative (blue) to positive (red); gray: rest shape"
+    figure.text(0.18 / width, 0.2 / height, key, fontsize=8, color=FAINT, va="center")
+    picture = BytesIO()
+    figure.savefig(picture, format="jpg" if jpeg else "png", pil_kwargs={"quality": 90} if jpeg else None)
+    return picture.getvalue()
+
+
+def displaced(basis: ModalBasis, axis: int, mode: int, length: float) -> Array:
+    """The rest shape (3, p) moved along a principal axis by a mode, as far as is well seen."""
+    values = basis.Upsilon[mode] / max(float(np.abs(basis.Upsilon[mode]).max()), 1e-12)
+    return np.asarray(basis.rest + AMPLITUDE * length * np.outer(basis.Phi[:, axis], values))
+
+
+def limits(basis: ModalBasis, view: View, length: float, columns: int) -> tuple[tuple[float, float], tuple[float, float]]:
+    """What all panels show, so that their sizes can be compared."""
+    shapes = [displaced(basis, axis, mode, length) for axis in range(3) for mode in range(columns)]
+    points = np.concatenate([view.flat(shape) for shape in [basis.rest, *shapes]])
+    margin = 0.02 * length
+    (left, bottom), (right, top) = points.min(axis=0) - margin, points.max(axis=0) + margin
+    return (left, right), (bottom, top)
+
+
+def draw_mode(
+    axes: Axes, basis: ModalBasis, mesh: Mesh, rim: Indices, view: View, axis: int, mode: int, length: float
+) -> None:
+    """One mode along one axis: a shaded surface over the outline of the rest shape."""
+    faces, shape = mesh.faces, displaced(basis, axis, mode, length)
+    points, rest = view.flat(shape), view.flat(basis.rest)
+    lines(axes, rest[rim], GHOST, 0.9)
+    values = basis.Upsilon[mode] / max(float(np.abs(basis.Upsilon[mode]).max()), 1e-12)
+    colors = MOVEMENT(0.5 + 0.5 * values)
+    colors[:, :3] *= brightness(shape, faces, view)[:, None]
+    depth = (view.axes[2] @ shape)[faces].mean(axis=1)
+    # A triangulation's order is the order it is painted in: the farthest first.
+    surface = TriMesh(Triangulation(points[:, 0], points[:, 1], faces[np.argsort(-depth)]))
+    surface.set_facecolor(colors)
+    axes.add_collection(surface, autolim=False)
+    lines(axes, points[mesh.edges], INK, 0.25, alpha=0.22)
+    lines(axes, points[rim], INK, 0.6, alpha=0.7)
+
+
+def lines(axes: Axes, ends: Array, color: str, width: float, alpha: float = 1.0) -> None:
+    """Straight lines (n, 2, 2) as a single one with gaps: one by one they would take ten times as long."""
+    gaps = np.full((len(ends), 1, 2), np.nan)
+    x, y = np.concatenate([ends, gaps], axis=1).reshape(-1, 2).T
+    axes.plot(x, y, color=color, linewidth=width, alpha=alpha, solid_capstyle="butt", zorder=1)
+
+
+def brightness(shape: Array, faces: Indices, view: View) -> Array:
+    """Light (p,) from 0 to 1 on the vertices of a shape (3, p), the same on both sides of the surface."""
+    a, b, c = (shape[:, faces[:, k]] for k in range(3))
+    normals = np.cross((b - a).T, (c - a).T)  # as long as the triangle is large
+    at_vertices = np.zeros((shape.shape[1], 3))
+    for k in range(3):
+        np.add.at(at_vertices, faces[:, k], normals)
+    at_vertices /= np.linalg.norm(at_vertices, axis=1, keepdims=True).clip(1e-12)
+    light = view.axes.T @ (LIGHT / np.linalg.norm(LIGHT))
+    return np.asarray(0.42 + 0.58 * np.abs(at_vertices @ light))
+
+
+def boundary(faces: Indices) -> Indices:
+    """Edges (n, 2) that belong to one triangle only."""
+    pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    edges, count = np.unique(pairs, axis=0, return_counts=True)
+    return np.asarray(edges[count == 1], np.int64)
+
+
+def draw_spectrum(axes: Axes, used: Array, spectrum: Array) -> None:
+    """Eigenvalues of −½CDC on two logarithmic scales; those of the modes in use stand out."""
+    positive = spectrum[spectrum > 1e-9 * spectrum[0]]
+    axes.loglog(np.arange(1, len(positive) + 1), positive, color=GHOST, linewidth=1.6)
+    axes.loglog(np.arange(1, len(used) + 1), used, "o", color="#c8502d", markersize=3.5)
+    axes.set_title(f"eigenvalues ({len(used)} modes in use)", fontsize=11, color=INK, pad=8)
+    axes.set_xlabel("mode", fontsize=9, color=FAINT)
+    axes.tick_params(which="both", labelsize=8, colors=FAINT)
+    axes.grid(which="major", color="#e6e8ec", linewidth=0.7)
+    for side, line in axes.spines.items():
+        line.set_visible(side in ("left", "bottom"))
+        line.set_color(GHOST)

@@ -1,0 +1,260 @@
+"""Writing a recording: everything a run knows, streamed to a file and, if wanted, to a viewer.
+
+What is written where is listed in `app.recording.entities`.
+"""
+
+import json
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from types import TracebackType
+from typing import Literal, Self
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from app.recording import entities
+from app.recording.images import cropped, embedded_video, jpeg, texture
+from app.recording.stream import Stream, check_writable
+from app.recording.styles import LEADING, coefficient_styles, placement, styles
+from app.recording.viewer import running_viewer, spawned_viewer
+from app.recording.wireframe import edge_strips, line_strips
+from app.terminal.errors import UsageError
+from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.modes import Metric, ModalBasis
+from reconstruction.camera import Camera
+from reconstruction.window.model import ShapeEstimate
+from tracking.klt import Observation
+from tracking.video import Frame
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+FLUSH_FRAMES = 100  # a full disk is noticed, and a killed run keeps its past, to within so many frames
+NOWHERE = np.empty((0, 2))
+
+
+class Recording:
+    """A recording being written; a context manager that completes the file whatever happens.
+
+    Args:
+        path: the .rrd file; None writes none (with neither file nor viewer, every call does nothing).
+        configuration: what the run was asked to do; stored with the version.
+        size: (width, height) of the picture, px.
+        connect: address of a running viewer, host:port or a rerun+http URL.
+        view: start a viewer.
+        image: how frames are stored: each as JPEG, the video file as it is, or not at all.
+        video: the source's file, for image="video".
+        overwrite: replace an existing file.
+
+    Raises:
+        UsageError: the file exists or cannot be written, no viewer answers, the video cannot be stored.
+    """
+
+    def __init__(
+        self,
+        path: Path | None,
+        *,
+        configuration: Mapping[str, object],
+        size: tuple[int, int],
+        connect: str | None = None,
+        view: bool = False,
+        image: Literal["jpeg", "video", "none"] = "jpeg",
+        video: Path | None = None,
+        overwrite: bool = False,
+    ) -> None:
+        self.path = path
+        self._size = size
+        self._image = image
+        self._video_ns: Indices = np.empty(0, np.int64)
+        self._frames = 0
+        self._last_seen: Array = NOWHERE
+        self._strips: list[Indices] = []
+        self._camera = Camera()
+        self._placed = False
+        self._stages: set[str] = set()
+
+        urls = [running_viewer(connect)] if connect else []
+        if image == "video":
+            asset, self._video_ns = embedded_video(video)
+        if path is not None:
+            check_writable(path, overwrite=overwrite)
+        if view:
+            urls.append(spawned_viewer())
+        self._stream = Stream(path, urls)
+        if path is not None:
+            self._stream.name(path.stem)
+        self._document(entities.CONFIGURATION, "Configuration", configuration)
+        self._stream.static(styles())
+        if image == "video":
+            self._stream.log(entities.IMAGE, asset, static=True)
+
+    def observe(self, frame: Frame, observation: Observation, *, phase: str) -> None:
+        """A frame, its tracked points and the run's phase."""
+        if not self._stream.open:
+            return
+        self._stream.at(frame.index, frame.time_s)
+        if self._image == "jpeg":
+            self._stream.log(entities.IMAGE, jpeg(frame.image))
+        elif self._image == "video":
+            nanoseconds = int(self._video_ns[min(frame.index, len(self._video_ns) - 1)])
+            self._stream.log(entities.IMAGE, rr.VideoFrameReference(nanoseconds=nanoseconds))
+
+        points, visible = observation.points_px, observation.visible
+        if len(self._last_seen) != len(points):
+            self._last_seen = np.full_like(points, np.nan)
+        self._last_seen[visible] = points[visible]
+        self._points(entities.SEEN, points[visible])
+        without_shape = not self._strips or phase.lower() == "lost"
+        lost = self._last_seen[~visible & np.isfinite(self._last_seen[:, 0])] if without_shape else NOWHERE
+        self._points(entities.LOST, lost)
+        if self._strips and without_shape:  # the model's last word would stay on the picture
+            self._points(entities.PREDICTED, NOWHERE)
+            self._stream.log(entities.WIREFRAME, rr.LineStrips2D([]))
+        self._stream.values(entities.OBSERVATION, "Observation", visible=visible, phase=phase)
+        if visible.size:
+            self._stream.log(entities.VISIBLE, rr.Scalars(visible.mean()))
+        self._frames += 1
+        if self._frames % FLUSH_FRAMES == 0:
+            self._stream.flush()
+
+    def rest(
+        self,
+        basis: ModalBasis,
+        faces: Indices,
+        edges: Indices,
+        camera: Camera,
+        *,
+        texture_bgr: NDArray[np.uint8],
+        texture_px: Array,
+    ) -> None:
+        """The model, once it is known; `texture_px` (p, 2) are its vertices' pixels in `texture_bgr`."""
+        if not self._stream.open:
+            return
+        self._strips = edge_strips(edges)
+        crop, origin = cropped(texture_bgr, texture_px)
+        self._stream.values(
+            entities.MODEL,
+            "Model",
+            static=True,
+            rest=basis.rest.ravel(),
+            Upsilon=basis.Upsilon.ravel(),
+            eigenvalues=basis.eigenvalues,
+            Phi=basis.Phi.ravel(),
+            faces=faces.ravel(),
+            edges=edges.ravel(),
+            strips=np.concatenate([np.append(strip, -1) for strip in self._strips]),
+            texture_px=texture_px.ravel(),
+            texture_origin=origin,
+            size=np.array(self._size),
+            perspective=camera.perspective,
+            focal_px=camera.focal_px,
+            center_px=camera.center_px,
+        )
+        self._stream.log(entities.MESH, texture(crop, texture_px - origin, faces), static=True)
+        self._camera = camera
+        self._stream.static(coefficient_styles(len(basis.eigenvalues)))
+
+    def estimate(self, index: int, time_s: float, estimate: ShapeEstimate) -> None:
+        """One frame's shape and pose."""
+        if not self._stream.open:
+            return
+        self._stream.at(index, time_s)
+        vertices, projection = estimate.shape.T, estimate.projection_px.astype(np.float32)
+        if not self._placed:
+            self._stream.static(placement(vertices, self._camera, self._size))
+            self._placed = True
+        self._stream.values(
+            entities.ESTIMATE,
+            "Estimate",
+            quaternion=estimate.quaternion,
+            t=estimate.t,
+            s=estimate.s,
+            Lambda=estimate.Lambda.ravel(),
+            visible=estimate.visible,
+        )
+        self._stream.log(entities.MESH, rr.Mesh3D.from_fields(vertex_positions=vertices.astype(np.float32)))
+        self._stream.log(entities.WIREFRAME, line_strips(projection, self._strips))
+        self._points(entities.PREDICTED, projection[~estimate.visible])
+        self._points(entities.LOST, NOWHERE)
+        residuals = estimate.residual_px[np.isfinite(estimate.residual_px)]
+        if residuals.size:
+            rms_and_median = [np.sqrt(np.mean(residuals**2)), np.median(residuals)]
+            self._stream.log(entities.ERROR, rr.Scalars(rms_and_median))
+        self._stream.log(entities.SPECTRUM, rr.BarChart.from_fields(values=estimate.Lambda.ravel()))
+        self._stream.log(entities.LEADING, rr.Scalars(estimate.Lambda[:, :LEADING].ravel()))
+
+    def timing(self, index: int, time_s: float, stage_ms: Mapping[str, float]) -> None:
+        """Milliseconds that each stage took for one frame."""
+        self._stream.at(index, time_s)
+        for stage, milliseconds in stage_ms.items():
+            entity = f"{entities.TIMING}/{stage}"
+            if stage not in self._stages:
+                self._stages.add(stage)
+                self._stream.log(entity, rr.SeriesLines(names=stage), static=True)
+            self._stream.log(entity, rr.Scalars(milliseconds))
+
+    def event(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:
+        """Something that happened, in words."""
+        self._stream.at(index, time_s)
+        self._stream.log(entities.EVENTS, rr.TextLog(text, level=level))
+
+    def modes(self, basis: ModalBasis, mesh: Mesh, metric: Metric) -> None:
+        """The figure of the mode shapes, which takes about a second to draw."""
+        if not self._stream.open:
+            return
+        from app.commands.modes import draw, spectrum, title
+
+        name = self.path.stem if self.path else "the run"
+        figure = draw(basis, mesh, spectrum(basis, mesh, metric), title(name, basis, metric), jpeg=True)
+        self._stream.log(entities.MODES, rr.EncodedImage(contents=figure, media_type="image/jpeg"), static=True)
+
+    def summary(self, values: Mapping[str, object]) -> None:
+        """What came out of the run."""
+        self._document(entities.SUMMARY, "Summary", values)
+
+    def close(self) -> None:
+        """Complete the file; one without a frame is removed, so as not to be in the way of the next run.
+
+        Raises:
+            UsageError: it could not be written.
+        """
+        self._stream.close()
+        if self.path is not None and self._frames == 0:
+            self.path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        try:
+            self.leave(failed=isinstance(error, Exception))
+        except UsageError:
+            if error is None:  # what ended the run matters more
+                raise
+
+    def leave(self, *, failed: bool) -> None:
+        """Close; a file of a run that failed before there was a shape is removed: there is nothing to look at.
+
+        Raises:
+            UsageError: it could not be written.
+        """
+        try:
+            self.close()
+        finally:
+            if failed and not self._placed and self.path is not None:
+                self.path.unlink(missing_ok=True)
+
+    def _points(self, entity: str, points_px: NDArray[np.floating]) -> None:
+        self._stream.log(entity, rr.Points2D.from_fields(positions=points_px.astype(np.float32)))
+
+    def _document(self, entity: str, title: str, values: Mapping[str, object]) -> None:
+        release = version("modeshape")
+        rows = [f"| {name} | {value} |" for name, value in values.items()]
+        text = "\n".join([f"# {title}", f"modeshape {release}", "", "| | |", "|---|---|", *rows])
+        self._stream.log(entity, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+        serial = json.dumps(dict(values), default=str)
+        self._stream.values(entity, "Document", static=True, json=serial, version=release)

@@ -1,0 +1,74 @@
+"""What a recording says once: colours, names and sizes of what is drawn, and where the scene stands."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from app.recording import entities
+from app.recording.stream import Loggable
+from reconstruction.camera import Camera
+
+SEEN_RGB = (64, 224, 128)
+PREDICTED_RGB = (255, 176, 0)
+LOST_RGB = (255, 48, 96)
+WIREFRAME_RGBA = (120, 200, 255, 80)
+SPECTRUM_RGB = (150, 160, 255)
+LAMBDA_RGB = (
+    ((40, 120, 255), (100, 160, 255), (160, 200, 255)),
+    ((0, 160, 110), (60, 200, 150), (140, 230, 190)),
+    ((255, 130, 0), (255, 170, 80), (255, 210, 150)),
+)
+"""Leading modes of Γ_α, Γ_β, Γ_τ: a row of Λ has a hue, higher modes are paler."""
+
+LEADING = len(LAMBDA_RGB[0])
+"""Entries per row of Λ that are plotted over time."""
+
+
+def styles() -> Iterator[tuple[str, Loggable]]:
+    """How points, lines and curves look."""
+    for entity in ("/", entities.WORLD):
+        yield entity, rr.ViewCoordinates.RDF
+    colors = {entities.SEEN: SEEN_RGB, entities.PREDICTED: PREDICTED_RGB, entities.LOST: LOST_RGB}
+    names = [(k, entity.rsplit("/", 1)[1], color) for k, (entity, color) in enumerate(colors.items(), start=1)]
+    yield "/", rr.AnnotationContext(names)
+    for k, entity in enumerate(colors, start=1):
+        # A negative radius is in points of the screen: the same size at every zoom.
+        yield entity, rr.Points2D.from_fields(class_ids=k, radii=-2.0, draw_order=30 + k, show_labels=False)
+    yield entities.WIREFRAME, rr.LineStrips2D.from_fields(colors=[WIREFRAME_RGBA], radii=-0.5, draw_order=20)
+    # The viewer's pixels are squares between whole numbers; ours, like OpenCV's, have their centres there.
+    yield entities.IMAGE, rr.Transform3D(translation=(-0.5, -0.5, 0.0))
+    yield entities.ERROR, rr.SeriesLines(names=["RMS", "median"], colors=[LOST_RGB, PREDICTED_RGB])
+    yield entities.VISIBLE, rr.SeriesLines(names="seen", colors=SEEN_RGB)
+
+
+def coefficient_styles(modes: int) -> Iterator[tuple[str, Loggable]]:
+    """How the plots of Λ look, when the number of modes is known."""
+    shown = min(LEADING, modes)
+    names = [f"{row}{k + 1}" for row in "αβτ" for k in range(shown)]
+    yield entities.LEADING, rr.SeriesLines(names=names, colors=[color for row in LAMBDA_RGB for color in row[:shown]])
+    # Bars in three groups. Rerun refuses a BarChart without values, and static ones would hide every frame's.
+    places = np.arange(3 * modes) + np.repeat(np.arange(3) * max(1, modes // 5), modes)
+    abscissa = rr.components.TensorDataBatch(places).described(rr.BarChart.descriptor_abscissa())
+    color = rr.components.ColorBatch(SPECTRUM_RGB).described(rr.BarChart.descriptor_color())
+    yield entities.SPECTRUM, [abscissa, color]
+
+
+def placement(vertices: NDArray[np.float64], camera: Camera, size: tuple[int, int]) -> Iterator[tuple[str, Loggable]]:
+    """Gives the first shape (p, 3) unit size at the origin, where the blueprint's eye looks."""
+    center = vertices.mean(axis=0)
+    scale = 1.0 / max(float(np.sqrt(np.mean(np.sum((vertices - center) ** 2, axis=1)))), 1e-9)
+    yield entities.MESH, rr.Transform3D(translation=-scale * center, scale=scale)
+    if camera.perspective:
+        # The viewer has no scaled cameras, and needs none: moved like the mesh, the camera sees the same.
+        yield entities.CAMERA, rr.Transform3D(translation=-scale * center)
+        yield (
+            entities.CAMERA,
+            rr.Pinhole(
+                image_from_camera=camera.K,
+                resolution=size,
+                camera_xyz=rr.ViewCoordinates.RDF,
+                image_plane_distance=0.25 * scale * camera.focal_px,
+            ),
+        )

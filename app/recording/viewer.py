@@ -1,0 +1,69 @@
+"""Finding or starting the viewer that a recording is streamed to."""
+
+import socket
+import subprocess
+from pathlib import Path
+from time import monotonic, sleep
+from urllib.parse import urlsplit
+
+import rerun_cli  # type: ignore[import-untyped]
+
+from app.terminal.errors import UsageError
+
+PORT = 9876
+TIMEOUT_S = 1.0
+SETTLE_S = 0.5  # after which one without a screen has ended
+START_S = 15.0  # until a viewer answers
+
+
+def running_viewer(address: str) -> str:
+    """The URL of a running viewer, from `host`, `host:port` or a rerun+http URL.
+
+    Raises:
+        UsageError: not an address, or nobody listens there.
+    """
+    parts = urlsplit(address if "://" in address else f"rerun+http://{address}")
+    try:
+        host, port = parts.hostname, parts.port or PORT
+    except ValueError:
+        host = None
+    if host is None or not parts.scheme.startswith("rerun"):
+        raise UsageError(f"--connect {address} is no viewer's address: give host:port, like 127.0.0.1:{PORT}")
+    if not listening(host, port):  # Rerun itself would wait 5 seconds, and go on without a viewer
+        raise UsageError(f"no viewer answers at {host}:{port}: start one with `rerun`, or use --view")
+    return f"{parts.scheme}://{host}:{port}/proxy"
+
+
+def spawned_viewer() -> str:
+    """The URL of a viewer on this machine, started unless one is running already.
+
+    Raises:
+        UsageError: it does not start.
+    """
+    if not listening("127.0.0.1", PORT):
+        program = Path(rerun_cli.__file__).with_name("rerun")  # of this very version, whatever is on PATH
+        # Not by rr.spawn: it would be open to the whole network.
+        command = [str(program), "--bind", "127.0.0.1", "--port", str(PORT), "--hide-welcome-screen", "--expect-data-soon"]
+        quiet = subprocess.DEVNULL
+        try:
+            viewer = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)
+        except OSError as error:
+            raise UsageError(f"--view: the viewer does not start: {error.strerror}") from error
+        patience = monotonic() + START_S
+        while not listening("127.0.0.1", PORT):
+            if viewer.poll() is not None or monotonic() > patience:
+                raise UsageError("--view: the viewer does not start (is there a screen?); open the file later")
+            sleep(0.05)
+        sleep(SETTLE_S)
+        if viewer.poll() is not None:
+            raise UsageError("--view: the viewer does not stay (is there a screen?); open the file later")
+    return f"rerun+http://127.0.0.1:{PORT}/proxy"
+
+
+def listening(host: str, port: int) -> bool:
+    """Whether somebody accepts connections there."""
+    try:
+        socket.create_connection((host, port), timeout=TIMEOUT_S).close()
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,149 @@
+"""Rigid bundle adjustment: poses by Levenberg-Marquardt, points by least squares, in turn, with the exact camera."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.state import State
+from reconstruction.window.energy import Energy
+from reconstruction.window.priors import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE
+from reconstruction.window.solver import Solver, minimise
+from reconstruction.window.statistics import Statistics, pose_statistics
+
+Array = NDArray[np.float64]
+Visibility = NDArray[np.bool_]
+
+POSES = Solver(iterations=10, tolerance=1e-4)
+
+
+@dataclass(frozen=True)
+class RigidMotion:
+    """A rigid shape and how it is seen in F frames.
+
+    Attributes:
+        shape: (3, p) centred.
+        R: (F, 3, 3) rotations.
+        s: (F,) scales.
+        t: (F, 2) image of the shape's origin relative to the principal point, px.
+    """
+
+    shape: Array
+    R: Array
+    s: Array
+    t: Array
+
+    def in_first_frame(self) -> "RigidMotion":
+        """The same in camera axes and pixels of the first frame: R[0] = 1, s[0] = 1."""
+        return replace(self, shape=self.s[0] * self.R[0] @ self.shape, R=self.R @ self.R[0].T, s=self.s / self.s[0])
+
+    def mirrored(self) -> "RigidMotion":
+        """Depth reversed: explains orthographic views as well."""
+        flip = np.diag([1.0, 1.0, -1.0])
+        return replace(self, shape=flip @ self.shape, R=flip @ self.R @ flip)
+
+
+def pose_energy(camera: Camera, tied: bool = False) -> Energy:
+    """The energy of a rigid shape's poses."""
+    scale = PERSPECTIVE_SCALE if camera.perspective else ORTHOGRAPHIC_SCALE
+    return Energy(rows=(), rest=0.0, rotation=1e-3, scale=scale, tied=tied)
+
+
+def bundle_adjust(
+    W: Array,
+    visible: Visibility,
+    motion: RigidMotion,
+    camera: Camera,
+    *,
+    flat: bool = False,
+    sweeps: int = 30,
+) -> tuple[RigidMotion, float]:
+    """Improve shape and poses over observations (F, 2, p) px with visibility (F, p).
+
+    Args:
+        W: (F, 2, p) px; anything where not visible.
+        visible: (F, p).
+        motion: where to start.
+        camera: the camera.
+        flat: keep the shape in its plane z = 0.
+        sweeps: most turns of poses and points.
+
+    Returns:
+        the motion and its RMS reprojection error in pixels.
+    """
+    previous = np.inf
+    energy, h = pose_energy(camera), visible.astype(np.float64)
+    W = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None]
+    for _ in range(sweeps):
+        motion, value = adjust_poses(W, h, motion, camera, energy)
+        if value > previous * (1 - 1e-3):
+            break
+        previous = value
+        motion = replace(motion, shape=solve_points(W, h, motion, camera, flat=flat))
+    return motion, reprojection_rms(W, h, motion, camera)
+
+
+def adjust_poses(W: Array, h: Array, motion: RigidMotion, camera: Camera, energy: Energy) -> tuple[RigidMotion, float]:
+    """Poses given the shape, and the energy reached; W (F, 2, p) relative to the principal point."""
+    radius = rms_radius(motion.shape)
+    start = State(quaternion_from_rotation(motion.R), motion.t / radius, np.log(motion.s), np.zeros((len(W), 3, 0)))
+    found = minimise(energy, pose_data(W, h, motion.shape, camera), start, None, POSES)
+    end = found.state
+    motion = RigidMotion(motion.shape, rotation_from_quaternion(end.q), np.exp(end.log_s), end.t * radius)
+    return motion, float(found.value.sum())
+
+
+def follow(W: Array, visible: Visibility, starts: list[RigidMotion], camera: Camera) -> list[RigidMotion]:
+    """Poses of observations (F, 2, p) px frame after frame, from each of several motions of one frame; all at a time."""
+    h = visible.astype(np.float64)
+    W = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None]
+    energy = replace(pose_energy(camera), rotation=0.0, scale=0.0)  # starts are no neighbours in time
+    radius = np.array([rms_radius(start.shape) for start in starts])
+    q = quaternion_from_rotation(np.concatenate([start.R for start in starts]))
+    t, s = (np.concatenate([getattr(start, name) for start in starts]) for name in ("t", "s"))
+    now, path = State(q, t / radius[:, None], np.log(s), np.zeros((len(starts), 3, 0))), []
+    every = [pose_data(W, h, start.shape, camera) for start in starts]
+    gram, cross, power = (np.stack([getattr(data, name) for data in every], axis=1) for name in ("gram", "cross", "power"))
+    for data in map(Statistics, gram, cross, power):
+        now = minimise(energy, data, now, None, POSES).state
+        path.append(now)
+    R = rotation_from_quaternion(np.stack([state.q for state in path]))
+    s, t = np.exp([state.log_s for state in path]), np.stack([state.t for state in path]) * radius[:, None]
+    return [RigidMotion(start.shape, R[:, k], s[:, k], t[:, k]) for k, start in enumerate(starts)]
+
+
+def pose_data(W: Array, h: Array, shape: Array, camera: Camera) -> Statistics:
+    """What points (F, 2, p) relative to the principal point say about the poses of a shape (3, p), in units of its size."""
+    radius = rms_radius(shape)
+    basis = np.concatenate([shape / radius, np.ones((1, shape.shape[1]))])
+    return pose_statistics(basis, W / radius, h, camera.focal_px / radius)
+
+
+def rms_radius(shape: Array) -> float:
+    """RMS distance of a centred shape's (3, p) points from its centre."""
+    return float(np.sqrt((shape**2).sum() / shape.shape[1]))
+
+
+def solve_points(W: Array, h: Array, motion: RigidMotion, camera: Camera, *, flat: bool) -> Array:
+    """Shape (3, p), centred, given the poses: one small linear system a point, exact also under perspective."""
+    A = motion.s[:, None, None] * motion.R
+    rows = A[:, :2, :, None] - (W / camera.focal_px)[:, :, None] * A[:, 2, None, :, None]  # (F, 2, 3, p)
+    if flat:
+        rows = rows[:, :, :2]
+    weighted = rows * h[:, None, None]
+    gram = np.einsum("fcip,fcjp->pij", weighted, rows, optimize=True)
+    right = np.einsum("fcip,fcp->pi", weighted, W - motion.t[:, :, None], optimize=True)
+    k = gram.shape[1]
+    damping = 1e-6 * np.trace(gram, axis1=1, axis2=2).mean() / k * np.eye(k)  # keeps points seen once or twice in place
+    anchor = damping @ motion.shape[:k]
+    points = np.linalg.solve(gram + damping, (right + anchor.T)[:, :, None])[:, :, 0].T
+    shape = np.concatenate([points, np.zeros((3 - k, points.shape[1]))])
+    return np.asarray(shape - shape.mean(axis=1, keepdims=True))
+
+
+def reprojection_rms(W: Array, h: Array, motion: RigidMotion, camera: Camera) -> float:
+    """RMS distance in pixels between observations (F, 2, p) relative to the principal point and the rigid shape."""
+    seen = motion.s[:, None, None] * motion.R @ motion.shape
+    image = (seen[:, :2] + motion.t[:, :, None]) / (1 + seen[:, 2:] / camera.focal_px)
+    return float(np.sqrt((((W - image) * h[:, None]) ** 2).sum() / h.sum()))

@@ -1,0 +1,1 @@
+"""The on-line bundle adjustment: data term, energy, priors, solver, window (paper §5)."""

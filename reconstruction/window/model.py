@@ -1,0 +1,142 @@
+"""A rest shape with its modes made dimensionless: the bridge between pixels and the solver (paper §3.3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction.basis.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges
+from reconstruction.basis.modes import Metric, ModalBasis, modal_basis, principal_axes
+from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.mapping.rest_shape import RestShape
+from reconstruction.state import State
+from reconstruction.window.ambiguity import Switch
+from reconstruction.window.edges import CoarseEdges
+from reconstruction.window.statistics import Statistics, frame_statistics
+
+Array = NDArray[np.float64]
+
+COARSE_VERTICES = 60
+
+
+@dataclass(frozen=True)
+class ShapeEstimate:
+    """One frame's pose and shape: S = R(S̄ + ΦΛΥ) moved in front of the camera (Eq. 3, 8).
+
+    Attributes:
+        frame: index in the order of observation.
+        quaternion: (4,) of R, w first.
+        R: (3, 3) rotation.
+        t: (2,) image translation, px: where the shape's origin is seen, relative to the principal point.
+        s: scale; the origin's depth is focal/s.
+        Lambda: (3, r) coefficients Γ_α, Γ_β, Γ_τ, px.
+        shape: (3, p) deformed shape in camera axes (x right, y down, z forward), pixels of the first frame.
+        projection_px: (p, 2) the shape seen by the camera.
+        residual_px: (p,) distance to the observation, NaN where not visible.
+        visible: (p,) h^f.
+        switch: the other branch that the window took with this frame, if it did.
+    """
+
+    frame: int
+    quaternion: Array
+    R: Array
+    t: Array
+    s: float
+    Lambda: Array
+    shape: Array
+    projection_px: Array
+    residual_px: Array
+    visible: NDArray[np.bool_]
+    switch: Switch | None = None
+
+
+class Model:
+    """A modal basis seen by a camera, in units of the rest shape's RMS radius and in its principal frame.
+
+    Attributes:
+        basis: the modes, in pixels.
+        mesh: connectivity of the points.
+        camera: the camera, in pixels.
+        radius: RMS distance of the rest shape's points to their centroid, px: the unit of length inside.
+        B: (4 + r, p) rows S̄', Υ' = √p Υ, 1.
+        focal: focal length in units of `radius`.
+    """
+
+    def __init__(self, basis: ModalBasis, mesh: Mesh, camera: Camera) -> None:
+        self.basis, self.mesh, self.camera = basis, mesh, camera
+        p = basis.rest.shape[1]
+        self.radius = float(np.sqrt((basis.rest**2).sum() / p))
+        self.focal = camera.focal_px / self.radius
+        self.B = np.concatenate([basis.Phi.T @ basis.rest / self.radius, np.sqrt(p) * basis.Upsilon, np.ones((1, p))])
+
+    @property
+    def unit(self) -> float:
+        """What Λ' is multiplied by to give Λ in pixels."""
+        return self.radius * float(np.sqrt(self.B.shape[1]))
+
+    def normalised(self, W: Array) -> Array:
+        """Image points (2, p) px as the solver wants them."""
+        return (W - self.camera.center_px[:, None]) / self.radius
+
+    def statistics(self, W: Array, weights: Array) -> Statistics:
+        """Sums of one frame's points (2, p) px with weights (p,)."""
+        return frame_statistics(self.B, self.normalised(W), weights, self.focal)
+
+    def rigid_statistics(self, W: Array, weights: Array) -> Statistics:
+        """The same for the rest shape alone, r = 0."""
+        rigid = np.concatenate([self.B[:3], self.B[-1:]])
+        return frame_statistics(rigid, self.normalised(W), weights, self.focal)
+
+    def projection(self, state: State, frame: int = -1) -> Array:
+        """Image (2, p) px of one frame of a state."""
+        seen = state.matrices()[frame] @ self.B
+        depth = 1 + seen[2] / self.focal
+        return np.asarray(seen[:2] / depth * self.radius + self.camera.center_px[:, None])
+
+    def residuals(self, W: Array, state: State, frame: int = -1) -> Array:
+        """Reprojection errors (2, p) px of one frame of a state."""
+        return W - self.projection(state, frame)
+
+    def estimate(self, frame: int, W: Array, visible: NDArray[np.bool_], state: State, row: int = -1) -> ShapeEstimate:
+        """One frame of a state in pixels; the observation W (2, p) gives the residuals."""
+        R = rotation_from_quaternion(state.q[row]) @ self.basis.Phi.T
+        s = float(np.exp(state.log_s[row]))
+        t = state.t[row] * self.radius
+        Lambda = state.Lambda[row] * self.unit
+        if self.camera.perspective:
+            origin = np.array([t[0] / s, t[1] / s, self.camera.focal_px / s])
+            shape = R @ self.basis.deform(Lambda) + origin[:, None]
+        else:
+            shape = s * (R @ self.basis.deform(Lambda)) + np.array([*t, 0.0])[:, None]
+        projection = self.projection(state, row)
+        residual = np.where(visible, np.linalg.norm(np.where(visible, W - projection, 0.0), axis=0), np.nan)
+        return ShapeEstimate(
+            frame, quaternion_from_rotation(R), R, t, s, Lambda, shape, projection.T.copy(), residual, visible
+        )
+
+    def coarse_edges(self, vertices: int = COARSE_VERTICES) -> CoarseEdges:
+        """Edges of a coarse mesh through well-spread points, triangulated in the main plane."""
+        rest, modes = self.B[:3], self.B[3:-1]
+        chosen = farthest_points(rest.T, vertices)
+        edges = chosen[unique_edges(triangulate(rest[:2, chosen].T).faces)]
+        d = rest[:, edges[:, 1]] - rest[:, edges[:, 0]]
+        return CoarseEdges(d, modes[:, edges[:, 1]] - modes[:, edges[:, 0]], np.linalg.norm(d, axis=0))
+
+
+def build_model(
+    rest: RestShape, camera: Camera, modes: int, metric: Metric = "euclidean", mesh: Mesh | None = None
+) -> Model:
+    """Mesh and modes of a rest shape.
+
+    Raises:
+        ReconstructionError: more modes than the points carry.
+    """
+    shape = rest.motion.shape
+    if mesh is None:
+        mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
+        x, y = (rest.motion.R[0] @ shape)[:2]
+        a, b, c = mesh.faces.T
+        area = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a])
+        if area.sum() > 0:  # y points down: outward normals face the camera when the image winds the other way
+            mesh = mesh_from_faces(mesh.faces[:, ::-1])
+    return Model(modal_basis(shape, mesh, modes, metric), mesh, camera)

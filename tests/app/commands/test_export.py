@@ -1,0 +1,373 @@
+"""Exports: opened again by other libraries, and equal to what the run had."""
+
+import csv
+import json
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+from app import demo
+from app.commands.export import FOLDERS, default_path, export, held, steady
+from app.options.export import Export
+from app.playback.overlay import enlarged
+from app.playback.playback import Playback
+from app.playback.tables import write_npz
+from app.recording.styles import PREDICTED_RGB, SEEN_RGB
+from app.terminal.errors import UsageError
+from app.terminal.progress import Progress
+from reconstruction.camera import Camera
+from tests.app.glb_file import GlbFile, issues
+from tests.synthetic_run import SIZE, Run, write_run
+
+FRAMES = 6
+FORMATS = ("glb", "obj", "ply", "csv", "npz", "mp4", "webm")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return write_run(tmp_path_factory.mktemp("export") / "sheet.rrd", frames=FRAMES)
+
+
+@pytest.fixture(scope="module")
+def orthographic(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    camera = Camera(np.inf, np.array([80.0, 60.0]))
+    return write_run(tmp_path_factory.mktemp("export") / "far.rrd", frames=FRAMES, camera=camera)
+
+
+@pytest.fixture(scope="module")
+def bootstrapping(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_run(tmp_path_factory.mktemp("export") / "early.rrd", frames=3, first_shape=9).path
+
+
+def exported(recording: Path, kind: str, folder: Path, **options: object) -> Path:
+    out = folder / (f"out_{kind}" if kind in FOLDERS else f"out.{kind}")
+    words = export(Export(recording, format=kind, out=out, **options), Progress())  # type: ignore[arg-type]
+    assert words["out"] == str(out)
+    assert words["frames_with_shape"] == FRAMES
+    assert not list(folder.glob("*.part*"))
+    return out
+
+
+def relative(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    return float(np.linalg.norm(a - b) / np.linalg.norm(b - b.mean(axis=0)))
+
+
+@pytest.mark.parametrize("which", ["run", "orthographic"])
+def test_glb_moves_as_the_shapes_and_is_valid(tmp_path: Path, which: str, request: pytest.FixtureRequest) -> None:
+    run: Run = request.getfixturevalue(which)
+    path = exported(run.path, "glb", tmp_path)
+    file = GlbFile(path)
+    assert file.times_s == pytest.approx(np.arange(FRAMES) / 30, abs=1e-6)
+    assert np.array_equal(file.faces, run.mesh.faces)
+    for time_s, estimate in zip(file.times_s, run.estimates, strict=True):
+        assert relative(file.vertices(time_s), estimate.shape.T) < 1e-4
+    assert issues(path) == []
+
+
+def test_glb_camera_sees_the_vertices_where_the_video_has_them(tmp_path: Path, run: Run) -> None:
+    gltf = (file := GlbFile(exported(run.path, "glb", tmp_path))).gltf
+    vertices = file.vertices(file.times_s[3])  # under the root; the camera node looks along z from its origin
+    focal_px = SIZE[1] / 2 / np.tan(gltf.cameras[0].perspective.yfov / 2)
+    seen = vertices[:, :2] / vertices[:, 2:] * focal_px + run.camera.center_px
+    assert np.abs(seen - run.estimates[3].projection_px).max() < 1e-2
+    assert gltf.cameras[0].perspective.aspectRatio == pytest.approx(SIZE[0] / SIZE[1])
+
+
+def test_glb_texture_has_the_video_s_colors_at_the_vertices(tmp_path: Path, run: Run) -> None:
+    file = GlbFile(exported(run.path, "glb", tmp_path))
+    image = cv2.imdecode(np.frombuffer(file.image(), np.uint8), cv2.IMREAD_COLOR)
+    places = file.uv * image.shape[1::-1] - 0.5
+    x, y = np.rint(places).astype(int).T
+    px, py = np.rint(run.pixels).astype(int).T
+    inside = np.abs(run.pixels - [80, 60]).min(axis=1) > 6  # away from the border between two colors
+    assert np.abs(image[y, x].astype(int) - run.picture[py, px])[inside].max() < 25
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply"])
+@pytest.mark.parametrize("axes", ["camera", "y-up"])
+def test_mesh_sequences_open_in_trimesh(tmp_path: Path, run: Run, kind: str, axes: str) -> None:
+    folder = exported(run.path, kind, tmp_path, axes=axes)
+    files = sorted(folder.glob("frame_*"))
+    assert [file.name for file in files] == [f"frame_{k:06d}.{kind}" for k in range(FRAMES)]
+    for file, estimate in zip(files, run.estimates, strict=True):
+        mesh = trimesh.load_mesh(file, process=False, maintain_order=True)
+        vertices = np.asarray(mesh.vertices) * ([1, -1, -1] if axes == "y-up" else 1)
+        assert relative(vertices, estimate.shape.T) < 1e-5
+        assert np.array_equal(mesh.faces, run.mesh.faces)
+    image = np.asarray(mesh.visual.material.image.convert("RGB"))
+    left, right = mesh.visual.uv[:, 0].argmin(), mesh.visual.uv[:, 0].argmax()
+    assert run.pixels[left, 0] < run.pixels[right, 0]
+    for vertex in (0, len(run.pixels) - 1):  # one in the top row, one in the bottom row of the picture
+        u, v = mesh.visual.uv[vertex]
+        x, y = int(u * image.shape[1]), int((1 - v) * image.shape[0])
+        px, py = np.rint(run.pixels[vertex]).astype(int)
+        assert np.abs(image[y, x, ::-1].astype(int) - run.picture[py, px]).max() <= 2
+    assert "unit: pixels" in files[0].read_bytes()[:300].decode(errors="ignore")
+
+
+@pytest.mark.parametrize("which", ["run", "orthographic"])
+def test_npz_is_what_the_run_had(tmp_path: Path, which: str, request: pytest.FixtureRequest) -> None:
+    run: Run = request.getfixturevalue(which)
+    with np.load(exported(run.path, "npz", tmp_path)) as stored:
+        values = dict(stored)
+    for key, name in (("S", "shape"), ("R", "R"), ("s", "s"), ("t", "t"), ("Lambda", "Lambda"), ("visible", "visible")):
+        expected = np.stack([getattr(estimate, name) for estimate in run.estimates])
+        assert values[key] == pytest.approx(expected, rel=1e-9, abs=1e-6), key
+    assert np.array_equal(values["faces"], run.mesh.faces)
+    assert np.array_equal(values["frames"], np.arange(FRAMES))
+    assert np.array_equal(np.isfinite(values["W"][:, 0]), values["visible"])
+    projected = np.stack([e.projection_px.T for e in run.estimates])
+    assert values["projection"] == pytest.approx(projected, abs=1e-6)
+    if run.camera.perspective:  # seen from its place, in its axes, the object is where the camera has it
+        k = 2
+        turned = values["camera_R"][k].T @ (run.basis.deform(values["Lambda"][k]) - values["camera_position"][k][:, None])
+        assert turned == pytest.approx(run.estimates[k].shape, abs=1e-6)
+    else:
+        assert np.isnan(values["camera_position"]).all()
+
+
+def test_npz_has_empty_rows_where_the_surface_was_lost(run: Run) -> None:
+    playback = Playback.load(run.path)
+    s, quaternion, visible = playback.s.copy(), playback.quaternion.copy(), playback.visible.copy()
+    s[3], quaternion[3], visible[3] = np.nan, np.nan, False
+    phases = [*playback.phases[:3], "lost", *playback.phases[4:]]
+    file = BytesIO()
+    write_npz(replace(playback, s=s, quaternion=quaternion, visible=visible, phases=phases), file, lambda: None)
+    with np.load(BytesIO(file.getvalue())) as stored:
+        assert stored["frames"].tolist() == list(range(FRAMES))
+        for key in ("S", "R", "s", "projection", "camera_R", "camera_position"):
+            assert [bool(np.isnan(row).all()) for row in stored[key]] == [k == 3 for k in range(FRAMES)], key
+        assert not stored["visible"][3].any()
+
+
+def read(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_csv_has_points_poses_and_coefficients(tmp_path: Path, run: Run) -> None:
+    folder = exported(run.path, "csv", tmp_path)
+    points, p = read(folder / "points.csv"), len(run.pixels)
+    assert len(points) == FRAMES * p
+    for frame, point in ((1, 0), (1, 1), (4, 3)):
+        row = points[frame * p + point]
+        assert (int(row["frame"]), int(row["point"])) == (frame, point)
+        estimate, observation = run.estimates[frame], run.observations[frame]
+        assert bool(int(row["visible"])) == observation.visible[point]
+        assert (row["observed_x"] == "") == (not observation.visible[point])
+        assert float(row["projected_x"]) == pytest.approx(estimate.projection_px[point, 0], rel=1e-6)
+        xyz = [float(row[axis]) for axis in "xyz"]
+        assert xyz == pytest.approx(estimate.shape[:, point], rel=1e-6)
+    frames, coefficients = read(folder / "frames.csv"), read(folder / "lambda.csv")
+    assert [row["phase"] for row in frames] == ["bootstrap"] * 2 + ["tracking"] * 4
+    assert float(frames[3]["qw"]) == pytest.approx(run.estimates[3].quaternion[0])
+    center = -run.estimates[3].R.T @ [*run.estimates[3].t, run.camera.focal_px]
+    assert [float(frames[3][f"camera_{axis}"]) for axis in "xyz"] == pytest.approx(center, rel=1e-6, abs=1e-5)
+    assert float(coefficients[5]["tau_2"]) == pytest.approx(run.estimates[5].Lambda[2, 1])
+    assert len(read(folder / "mesh.csv")) == len(run.mesh.faces)
+
+
+@pytest.mark.parametrize("kind", ["mp4", "webm"])
+def test_videos_show_every_frame_with_its_points(tmp_path: Path, run: Run, kind: str) -> None:
+    video = cv2.VideoCapture(str(exported(run.path, kind, tmp_path)))
+    assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(30, abs=0.01)
+    pictures = []
+    while (frame := video.read())[0]:
+        pictures.append(frame[1])
+    assert len(pictures) == FRAMES
+    assert pictures[0].shape[1::-1] == enlarged(SIZE)
+    scale = enlarged(SIZE)[0] / SIZE[0]
+    observation, estimate = run.observations[1], run.estimates[1]
+
+    def near(places_px: NDArray[np.float64], color: tuple[int, int, int]) -> float:
+        x, y = np.rint((places_px + 0.5) * scale - 0.5).astype(int).T
+        return float(np.mean(np.abs(pictures[1][y, x].astype(int) - color[::-1]).max(axis=1) < 70))
+
+    seen = observation.visible
+    assert near(observation.points_px[seen], SEEN_RGB) > 0.9
+    assert near(estimate.projection_px[~seen], PREDICTED_RGB) > 0.9
+    assert near(observation.points_px[seen], PREDICTED_RGB) < 0.1
+
+
+def test_an_overlay_is_still_the_frame_away_from_the_mesh(tmp_path: Path, run: Run) -> None:
+    video = cv2.VideoCapture(str(exported(run.path, "mp4", tmp_path)))
+    image = video.read()[1]
+    assert np.abs(image[: image.shape[0] // 10].astype(int) - run.picture[0, 0]).max() < 12
+
+
+@pytest.mark.parametrize(
+    ("times", "fps", "shown"),
+    [
+        ([0, 0.1, 0.2, 0.3], 10, [1, 1, 1, 1]),
+        ([5, 5.1, 5.2, 5.5, 5.6], 10, [1, 1, 3, 1, 1]),
+        ([0, 0.1, 0.1, 0.2, 0.3], 10, [1, 0, 1, 1, 1]),
+        ([2.0], 25, [1]),
+        ([0, 0, 0], 25, [1, 1, 1]),
+    ],
+)
+def test_videos_keep_the_time(times: list[float], fps: float, shown: list[int]) -> None:
+    rate, counts = steady(np.array(times, float))
+    assert rate == pytest.approx(fps)
+    assert counts.tolist() == shown
+
+
+def test_gaps_hold_the_last_value_and_the_start_the_first() -> None:
+    values = np.array([np.nan, np.nan, 1, 2, np.nan, np.nan, 5])
+    assert held(values).tolist() == [1, 1, 1, 2, 2, 2, 5]
+    assert held(np.column_stack([values, values]))[:, 1].tolist() == [1, 1, 1, 2, 2, 2, 5]
+
+
+def test_a_video_is_not_named_like_its_source() -> None:
+    names = {kind: default_path(Path("here/sheet.rrd"), kind).as_posix() for kind in FORMATS}
+    assert names["mp4"] == "here/sheet-overlay.mp4"
+    assert names["glb"] == "here/sheet.glb"
+    assert names["obj"] == "here/sheet_obj"
+    assert len(set(names.values())) == len(FORMATS)
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_nothing_is_replaced_unasked(tmp_path: Path, run: Run, kind: str) -> None:
+    path = exported(run.path, kind, tmp_path)
+    with pytest.raises(UsageError, match=r"exists.*--overwrite"):
+        exported(run.path, kind, tmp_path)
+    foreign = path / "notes.txt" if path.is_dir() else tmp_path / "notes.txt"
+    foreign.write_text("mine")
+    if kind in ("obj", "ply"):
+        (path / f"frame_000099.{kind}").write_text("of a longer recording")
+    exported(run.path, kind, tmp_path, overwrite=True)
+    assert foreign.read_text() == "mine"
+    assert not (path / f"frame_000099.{kind}").exists()
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_a_recording_without_a_model_is_refused(tmp_path: Path, bootstrapping: Path, kind: str) -> None:
+    with pytest.raises(UsageError, match="contains no model"):
+        exported(bootstrapping, kind, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_video_needs_pictures(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "blind.rrd", image="none")
+    with pytest.raises(UsageError, match="no pictures"):
+        exported(run.path, "mp4", tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["blind.rrd"]
+
+
+@pytest.mark.parametrize("kind", ["obj", "glb", "npz", "csv"])
+def test_a_full_disk_leaves_nothing(tmp_path: Path, run: Run, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", full)
+    monkeypatch.setattr("app.playback.tables.table", full)
+    monkeypatch.setattr("app.files.mesh_sequence.MeshSequence.add", full)
+    monkeypatch.setattr("app.files.gltf.glb", full)
+    with pytest.raises(UsageError, match="No space left"):
+        exported(run.path, kind, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_in_the_place_of_a_folder(tmp_path: Path, run: Run) -> None:
+    (tmp_path / "out_obj").write_text("")
+    with pytest.raises(UsageError, match="is a file"):
+        exported(run.path, "obj", tmp_path, overwrite=True)
+
+
+@pytest.mark.parametrize("kind", ["glb", "obj"])
+def test_an_unwritable_folder(tmp_path: Path, run: Run, kind: str) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match="cannot write"):
+        export(Export(run.path, format=kind, out=tmp_path / "file" / f"x.{kind}"), Progress())  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({}, "no format"),
+        ({"out": Path("x.gltf")}, "no format"),
+        ({"format": "glb", "out": Path("x.gltf")}, "let it end in .glb"),
+        ({"format": "mp4", "out": Path("x.webm")}, "let it end in .mp4"),
+    ],
+)
+def test_formats_that_do_not_fit(options: dict[str, object], complaint: str) -> None:
+    with pytest.raises(UsageError, match=complaint):
+        Export(Path("sheet.rrd"), **options)  # type: ignore[arg-type]
+
+
+def test_the_ending_tells_the_format() -> None:
+    assert Export(Path("sheet.rrd"), out=Path("x.NPZ")).kind == "npz"
+    assert Export(Path("sheet.rrd"), format="obj", out=Path("x.y")).kind == "obj"
+
+
+def modeshape(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    script = Path(sys.executable).with_name("modeshape")
+    return subprocess.run([script, *map(str, words)], capture_output=True, text=True, timeout=120)
+
+
+def test_the_command_line(tmp_path: Path, run: Run) -> None:
+    recording = shutil.copy(run.path, tmp_path)
+    done = modeshape("export", recording, "--format", "glb", "--json")
+    assert done.returncode == 0, done.stderr
+    words = json.loads(done.stdout)
+    assert (words["out"], words["points"]) == (str(tmp_path / "sheet.glb"), len(run.pixels))
+    assert (tmp_path / "sheet.glb").is_file()
+
+
+@pytest.mark.parametrize(
+    ("video", "roi"),
+    [("kinect_paper.mp4", (195, 95, 325, 265)), ("talking_face.mp4", (115, 70, 130, 160)), (None, None)],
+    ids=["paper", "face", "demo"],
+)
+def test_a_real_run_agrees_with_its_own_shapes(
+    tmp_path: Path, request: pytest.FixtureRequest, video: str | None, roi: tuple[int, ...] | None
+) -> None:
+    recording, shapes = tmp_path / "real.rrd", tmp_path / "shapes.npz"
+    source = demo.sample().video if video is None else request.getfixturevalue("shared_data") / video
+    options = ("--roi", *map(str, roi or demo.sample().roi), "--frames", "0:30", "--points", "200")
+    done = modeshape("run", source, *options, "--out", recording, "--shapes-out", shapes)
+    assert done.returncode == 0, done.stderr
+    with np.load(shapes) as stored:
+        truth = dict(stored)
+    with np.load(words_out(recording, "npz")) as stored:
+        assert set(truth) <= set(stored)
+        for key, values in truth.items():
+            assert stored[key] == pytest.approx(values, rel=1e-4, abs=1e-6), key
+    glb = GlbFile(words_out(recording, "glb"))
+    sequence = sorted(words_out(recording, "ply").glob("frame_*.ply"))
+    for time_s, path, S in zip(glb.times_s, sequence, truth["S"], strict=True):
+        assert relative(glb.vertices(time_s), S.T) < 1e-4
+        assert relative(np.asarray(trimesh.load_mesh(path, process=False).vertices), S.T) < 1e-4
+    assert issues(words_out(recording, "glb", overwrite=True)) == []
+
+
+def words_out(recording: Path, kind: str, **options: object) -> Path:
+    words = export(Export(recording, format=kind, **options), Progress())  # type: ignore[arg-type]
+    return Path(str(words["out"]))
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["sheet.rrd", "--format", "fbx"], "fbx"),
+        (["notes.txt", "--format", "glb"], "notes.txt"),
+        (["absent.rrd", "--format", "glb"], "absent.rrd"),
+        (["sheet.rrd"], "--format"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(tmp_path: Path, run: Run, words: list[str], complaint: str) -> None:
+    (tmp_path / "notes.txt").write_text("no recording")
+    shutil.copy(run.path, tmp_path / "sheet.rrd")
+    done = modeshape("export", tmp_path / words[0], *words[1:])
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1
+    assert complaint in done.stderr

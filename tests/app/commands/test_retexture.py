@@ -1,0 +1,316 @@
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app import demo
+from app.commands.retexture import first_frame, is_recording, retexture
+from app.demo.camera import shading
+from app.demo.motion import HEIGHT_MM, WIDTH_MM
+from app.files.video_out import PacedVideo, VideoSink
+from app.options.retexture import Retexture
+from app.options.run import Output, Run
+from app.painting.compositing import Compositor, bounding_box
+from app.painting.picture import Artwork, premultiplied
+from app.pipeline.session import Session
+from app.playback.playback import Playback
+from app.terminal.errors import UsageError
+from app.terminal.progress import Progress
+from tests.app.terminal import Command, in_own_process
+from tests.synthetic_run import SIZE, picture, write_run
+from tracking.video import Video
+
+Image = NDArray[np.uint8]
+Floats = NDArray[np.float64]
+
+FRAMES = 240  # of the demo: the hand comes and goes in 196 to 238
+WHITE_PAPER = 245 / 255  # of the demo's page
+
+
+def card() -> Image:
+    """A test card: coloured squares, a disc, a word."""
+    y, x = np.mgrid[:420, :594]
+    hue = np.dstack([x / 594 * 179, np.full(x.shape, 150.0), np.full(x.shape, 230.0)]).astype(np.uint8)
+    squares = ((x // 33 + y // 35) % 2)[..., None] > 0
+    image = np.where(squares, cv2.cvtColor(hue, cv2.COLOR_HSV2BGR), 250).astype(np.uint8)
+    cv2.circle(image, (297, 210), 110, (40, 40, 200), -1, cv2.LINE_AA)
+    cv2.putText(image, "MODE", (215, 225), cv2.FONT_HERSHEY_SIMPLEX, 1.8, (255, 255, 255), 6, cv2.LINE_AA)
+    return image
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The demo, as its users have it, up to where the hand is gone."""
+    made = demo.sample()
+    path = tmp_path_factory.mktemp("demo") / "demo.rrd"
+    Session(Run(str(made.video), roi=made.roi, frames=f":{FRAMES}", output=Output(out=path)), Progress()).run()
+    return path
+
+
+@pytest.fixture
+def texture(tmp_path: Path) -> Path:
+    path = tmp_path / "card.png"
+    cv2.imwrite(str(path), card())
+    return path
+
+
+@pytest.fixture
+def sheet(tmp_path: Path) -> Path:
+    """A small recording without noise."""
+    return write_run(tmp_path / "sheet.rrd").path
+
+
+def frames_of(path: Path) -> list[Image]:
+    with Video(str(path)) as video:
+        return [frame.image for frame in video]
+
+
+def command(source: object, texture: Path, out: Path, **options: object) -> Retexture:
+    return Retexture(source=str(source), texture=texture, out=out, **options)  # type: ignore[arg-type]
+
+
+def decibels(squared: float) -> float:
+    return float(10 * np.log10(255**2 / squared))
+
+
+def test_the_demo_is_retextured_as_if_it_were_printed(recording: Path) -> None:
+    """The composite at the true places of the sheet's points, against the card's colours there times the true light.
+
+    Points that the mesh covers and the true hand does not; light as the sample was rendered, without any fitted gain.
+    """
+    playback, work = Playback.load(recording), None
+    columns, rows = 594, 420
+    across, down = np.meshgrid((np.arange(columns) + 0.5) / columns - 0.5, (np.arange(rows) + 0.5) / rows - 0.5)
+    xy_mm = np.stack([across * WIDTH_MM, down * HEIGHT_MM], axis=-1).reshape(-1, 2)
+    first_px = demo.project(demo.surface(0).points(xy_mm)).astype(np.float32).reshape(rows, columns, 2)
+    x, y, w, h = bounding_box(playback.texture_px)
+    small = cv2.GaussianBlur(cv2.resize(card(), (2 * w, 2 * h), interpolation=cv2.INTER_AREA), (0, 0), 0.8)
+    within = (first_px - np.float32((x - 0.5, y - 0.5))) * 2 - np.float32(0.5)
+    printed = remapped(small, within)
+    squares: list[float] = []
+    hidden = in_front = painted = free = 0.0
+    for i, image in playback.images():
+        assert image is not None
+        if work is None:
+            work = Compositor(image, playback.texture_px, playback.mesh, perspective=True)
+            mesh_cover = work.first(premultiplied(np.full((4, 4, 3), 255, np.uint8)))
+            changed = (mesh_cover != image).any(axis=-1).astype(np.float32)
+            covered = remapped(cv2.erode(changed, np.ones((3, 3), np.uint8)), first_px) == 1
+        estimate = playback.estimate(i)
+        assert estimate is not None
+        seen = work.paint(image, premultiplied(card()), estimate.projection_px, estimate.shape[2], playback.W[i].T)
+        if i % demo.TRUTH_EVERY:
+            continue
+        sheet = demo.surface(i)
+        places = demo.project(sheet.points(xy_mm)).astype(np.float32).reshape(rows, columns, 2)
+        hand = demo.occluder(i).astype(np.uint8)
+        light = shading(sheet, xy_mm).reshape(rows, columns, 1) * vignette(places)
+        expected = np.clip(printed * light, 0, 255)
+        visible = covered & (remapped(cv2.dilate(hand, np.ones((3, 3), np.uint8)).astype(np.float32), places) == 0)
+        squares.append(float(((remapped(seen, places) - expected)[visible] ** 2).mean()))
+        if not hand.any():
+            continue
+        still = remapped((np.abs(seen.astype(int) - image).max(axis=-1) <= 8).astype(np.float32), places) > 0.5
+        under = covered & (remapped(hand.astype(np.float32), places) == 1)
+        hidden, in_front = hidden + under.sum(), in_front + (under & still).sum()
+        # Where the card has the page's own colour by chance, painting changes nothing.
+        differs = covered & (np.abs(expected - remapped(image, places)).max(axis=-1) > 40)
+        painted, free = painted + (differs & visible & ~still).sum(), free + (differs & visible).sum()
+    assert decibels(float(np.mean(squares))) > 28  # measured: 29.6
+    assert np.median([decibels(s) for s in squares]) > 29  # measured: 30.7
+    assert min(decibels(s) for s in squares) > 23  # measured: 24.6, beside the hand
+    assert in_front / hidden > 0.95  # measured: 0.986
+    assert painted / free > 0.95  # measured: 0.991
+
+
+def remapped(picture: NDArray[np.generic], places: NDArray[np.float32]) -> Floats:
+    return np.asarray(cv2.remap(picture, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), float)  # type: ignore[call-overload]
+
+
+def vignette(places: NDArray[np.float32]) -> Floats:
+    """What the sample's lens takes away towards the corners."""
+    squared = ((places - np.float32((320, 240))) ** 2).sum(axis=-1) / 320**2
+    return np.asarray(1 - 0.09 * squared, float)[..., None]
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".webm"])
+def test_a_recording_is_enough(tmp_path: Path, sheet: Path, ending: str) -> None:
+    texture, out = tmp_path / "red.png", tmp_path / f"new{ending}"
+    cv2.imwrite(str(texture), np.full((20, 30, 3), (20, 20, 240), np.uint8))
+    words = retexture(command(sheet, texture, out), Progress())
+    assert words["frames"] == words["painted_frames"] == 6
+    frames = frames_of(out)
+    assert len(frames) == 6
+    assert frames[0].shape == (SIZE[1], SIZE[0], 3)
+    inside, outside = frames[0][40:80, 50:110].astype(int), frames[0][:15].astype(int)
+    assert (inside[..., 2] - inside[..., 0]).min() > 60
+    assert np.abs(outside - picture()[:15]).max() < 12
+    assert not list(tmp_path.glob("*.part*"))
+
+
+def test_a_video_is_painted_while_it_is_tracked(tmp_path: Path, videos: Path, texture: Path) -> None:
+    out, rrd = tmp_path / "live.mp4", tmp_path / "live.rrd"
+    run = command(videos / "turning.mp4", texture, out, points=120, rrd=rrd)
+    words = retexture(run, Progress())
+    assert words["frames"] == words["painted_frames"] == 40
+    live = frames_of(out)
+    assert len(live) == 40
+    again = tmp_path / "again.mp4"
+    retexture(command(rrd, texture, again), Progress())
+    assert np.mean([np.abs(a.astype(int) - b).mean() for a, b in zip(live, frames_of(again), strict=True)]) < 3
+
+
+def test_without_its_name_a_live_run_leaves_no_recording(here: Path, videos: Path, texture: Path) -> None:
+    retexture(command(videos / "turning.mp4", texture, here / "live.mp4", points=120, frames=":12"), Progress())
+    assert [path.name for path in here.iterdir()] == ["live.mp4"]
+
+
+def test_the_first_frame_is_found_in_a_later_part(tmp_path: Path) -> None:
+    playback = Playback.load(write_run(tmp_path / "sheet.rrd").path)
+    elsewhere = np.zeros((SIZE[1], SIZE[0], 3), np.uint8)
+    seen = first_frame(playback, 0, elsewhere)
+    assert seen.shape == elsewhere.shape
+    assert np.array_equal(seen[30:90, 40:120], picture()[30:90, 40:120])
+    painted = replace(playback, configuration={"texture": "card.png"})
+    assert first_frame(painted, 0, elsewhere) is elsewhere
+    with pytest.raises(UsageError, match="give the first part of the recording"):
+        first_frame(replace(painted, W=painted.W + 20), 0, elsewhere)
+
+
+def test_run_with_a_texture_paints_the_recording(tmp_path: Path, videos: Path, texture: Path) -> None:
+    shown = {}
+    for name, options in (("plain", {}), ("painted", {"texture": texture, "opacity": 1.0})):
+        path = tmp_path / f"{name}.rrd"
+        run = Run(str(videos / "turning.mp4"), points=120, frames=":12", output=Output(out=path), **options)  # type: ignore[arg-type]
+        Session(run, Progress()).run()
+        shown[name] = Playback.load(path)
+    before, after = shown["plain"].texture_bgr.astype(int), shown["painted"].texture_bgr.astype(int)
+    assert np.abs(before - after).mean() > 30
+    x, y = shown["painted"].texture_origin
+    first = next(image for _, image in shown["painted"].images())
+    assert first is not None
+    h, w = before.shape[:2]
+    assert np.abs(first[y : y + h, x : x + w].astype(int) - before).mean() < 4  # the frame itself stays what it was
+
+
+def test_a_video_moves_on_the_surface_and_begins_again(tmp_path: Path) -> None:
+    path = tmp_path / "moving.mp4"
+    with VideoSink(path, (64, 48), 10.0) as sink:
+        for level in (40, 90, 140, 190):
+            sink.write(np.full((48, 64, 3), level, np.uint8))
+    with Artwork(path) as artwork:
+        shown = [artwork.at(t)[..., :3].copy() for t in (0.0, 0.05, 0.1, 0.25, 0.39, 0.4, 0.75, 0.81, 4.35)]
+    frames = frames_of(path)  # as compressed: the grey levels are off by a few
+    assert len(frames) == 4
+    for picture_, k in zip(shown, (0, 0, 1, 2, 3, 0, 3, 0, 3), strict=True):
+        assert np.array_equal(picture_, frames[k])
+
+
+def test_frames_of_uneven_times_keep_them(tmp_path: Path) -> None:
+    path = tmp_path / "uneven.mp4"
+    with VideoSink(path, (64, 48), 10.0) as sink:
+        paced = PacedVideo(sink, 10.0)
+        for level, time_s in ((40, 5.0), (90, 5.1), (140, 5.4), (150, 5.41), (190, 5.5)):
+            paced.write(np.full((48, 64, 3), level, np.uint8), time_s)
+        paced.end()
+    levels = [float(frame.mean()) for frame in frames_of(path)]
+    assert np.abs(np.array(levels) - (40, 90, 90, 90, 150, 190)).max() < 4
+
+
+def test_the_picture_s_own_size_and_alpha_are_read(tmp_path: Path) -> None:
+    for name, picture_ in (
+        ("grey", np.full((9, 7), 100, np.uint8)),
+        ("deep", np.full((9, 7, 3), 100 * 257, np.uint16)),
+        ("clear", np.dstack([np.full((9, 7, 3), 200, np.uint8), np.full((9, 7), 128, np.uint8)])),
+    ):
+        cv2.imwrite(str(tmp_path / f"{name}.png"), picture_)
+        with Artwork(tmp_path / f"{name}.png") as artwork:
+            read = artwork.at(0.0)
+        assert read.shape == (9, 7, 4)
+        assert np.abs(read[..., 0].astype(int) - 100).max() <= 1
+        assert read[0, 0, 3] == (128 if name == "clear" else 255)
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"texture": Path("missing.png")}, r"no texture missing\.png"),
+        ({"texture": Path("text.png")}, r"texture text\.png is not a picture"),
+        ({"texture": Path("text.mov")}, r"texture text\.mov is no picture and no video"),
+        ({"out": Path("new.avi")}, r"videos are written as \.mp4 or \.webm"),
+        ({"out": Path("old.mp4")}, r"old\.mp4 exists: replace it with --overwrite"),
+        ({"out": Path("text.png/new.mp4")}, r"cannot write text\.png/new\.mp4"),
+        ({"source": "missing.rrd"}, r"missing\.rrd"),
+        ({"source": "text.rrd"}, r"text\.rrd"),
+        ({"source": "missing.mp4"}, r"no video file missing\.mp4"),
+        ({"roi": (1, 2, 30, 40)}, r"--roi is for videos"),
+        ({"rrd": Path("x.rrd")}, r"--rrd is for videos"),
+        ({"place": (0, 0, 5, 5)}, r"--place 0 0 5 5 is not on the surface"),
+        ({"frames": "90:99"}, r"no frame in 90:99"),
+    ],
+    ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
+)
+def test_mistakes_are_named(here: Path, sheet: Path, texture: Path, change: dict[str, object], complaint: str) -> None:
+    for name in ("text.png", "text.mov", "text.rrd", "old.mp4"):
+        (here / name).write_text("words\n" * 99)
+    asked = {"source": str(sheet), "texture": texture, "out": Path("new.mp4")} | change
+    with pytest.raises(ValueError, match=complaint):
+        retexture(Retexture(**asked), Progress())  # type: ignore[arg-type]
+    assert not (here / "new.mp4").exists()
+    assert (here / "old.mp4").read_text().startswith("words")
+
+
+@pytest.mark.parametrize(("place", "opacity"), [((1, 2, 0, 9), 1.0), ((1, 2, 9, -1), 1.0), (None, 1.5), (None, -0.1)])
+def test_options_that_mean_nothing(place: tuple[int, int, int, int] | None, opacity: float) -> None:
+    with pytest.raises(UsageError, match=r"--place|--opacity"):
+        command("a.rrd", Path("b.png"), Path("c.mp4"), place=place, opacity=opacity)
+
+
+def test_a_recording_without_pictures_is_refused(tmp_path: Path, texture: Path) -> None:
+    run = write_run(tmp_path / "blind.rrd", image="none")
+    with pytest.raises(UsageError, match=r"no pictures: run again with --image"):
+        retexture(command(run.path, texture, tmp_path / "new.mp4"), Progress())
+
+
+def test_a_codec_that_is_not_there(tmp_path: Path, sheet: Path, texture: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.files.video_out.CODECS", {".mp4": "XXXX", ".webm": "XXXX"})
+    with pytest.raises(UsageError, match=r"this OpenCV has no XXXX encoder"):
+        retexture(command(sheet, texture, tmp_path / "new.webm"), Progress())
+    assert not list(tmp_path.glob("new*"))
+
+
+def test_a_disk_that_fills_up(tmp_path: Path, sheet: Path, texture: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    usage = shutil.disk_usage(tmp_path)
+    monkeypatch.setattr("app.files.video_out.shutil.disk_usage", lambda _: usage._replace(free=1000))
+    with pytest.raises(UsageError, match=r"cannot write .*new\.mp4: the disk is full"):
+        retexture(command(sheet, texture, tmp_path / "new.mp4"), Progress())
+    assert not list(tmp_path.glob("new*"))
+
+
+def test_the_command_line(modeshape: Command, here: Path, sheet: Path, texture: Path) -> None:
+    done = modeshape("retexture", sheet, "--texture", texture, "--out", "new.mp4", "--opacity", 0.8, "--json")
+    assert done.code == 0
+    assert json.loads(done.out)["painted_frames"] == 6
+    assert (here / "new.mp4").stat().st_size > 0
+    done = modeshape("retexture", sheet, "--texture", texture, "--out", "new.mp4")
+    assert (done.code, done.err.count("\n")) == (2, 1)
+
+
+def test_help_is_there_at_once(tmp_path: Path) -> None:
+    done = in_own_process(tmp_path, "retexture", "--help")
+    assert done.code == 0
+    assert "--place" in done.out
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "found"), [("a.rrd", b"", True), ("b", b"RRF2abc", True), ("c", b"abc", False)]
+)
+def test_recordings_are_recognised(tmp_path: Path, name: str, content: bytes, found: bool) -> None:
+    (tmp_path / name).write_bytes(content)
+    assert is_recording(str(tmp_path / name)) is found
+    assert not is_recording("0")

@@ -1,0 +1,146 @@
+"""The frame loop: frame numbers, stages, interrupts at awkward moments."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.options.model import Model
+from app.options.run import Output, Run
+from app.pipeline.parts import free_name
+from app.pipeline.session import Session
+from app.playback.playback import Playback
+from app.terminal.errors import UsageError
+from app.terminal.progress import Progress
+from reconstruction import ReconstructionError
+from reconstruction.window.ambiguity import Switch
+from reconstruction.window.model import ShapeEstimate
+from reconstruction.window.window import SlidingWindow
+from tests.synthetic_run import verify
+
+
+def config(videos: Path, frames: str = ":20", rest_shape: str = "auto", **output: object) -> Run:
+    return Run(
+        source=str(videos / "turning.mp4"),
+        points=120,
+        frames=frames,
+        rest_shape=rest_shape,
+        model=Model(modes=6),
+        output=Output(out=Path("run.rrd"), image="none", **output),  # type: ignore[arg-type]
+    )
+
+
+class Impatient(Progress):
+    """Somebody who presses Ctrl-C after some frames."""
+
+    def __init__(self, frames: int) -> None:
+        super().__init__()
+        self.left = frames
+
+    def advance(self, phase: str, error_px: float | None = None) -> None:
+        super().advance(phase, error_px)
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+@pytest.fixture(autouse=True)
+def in_folder(here: Path) -> None:
+    """Recordings go to a folder of their own."""
+
+
+def test_frames_keep_their_numbers_in_the_source(videos: Path) -> None:
+    words = Session(config(videos, "7:25", shapes_out=Path("shapes.npz")), Progress()).run()
+    assert words["frames"] == 18
+    assert words["interrupted"] is False
+    with np.load("shapes.npz") as shapes:
+        assert shapes["frames"].tolist() == list(range(7, 25))
+
+
+def test_stages_add_up_to_the_time_it_took(videos: Path) -> None:
+    words = Session(config(videos), Progress()).run()
+    assert isinstance(words["stage_ms"], dict)
+    assert isinstance(words["fps"], float)
+    assert min(words["stage_ms"].values()) >= 0
+    assert sum(words["stage_ms"].values()) <= 1.05 * 1000 / words["fps"]
+    assert sum(words["stage_ms"].values()) >= 0.5 * 1000 / words["fps"]
+
+
+@pytest.mark.parametrize("rest_shape", ["auto", "plane", "rigid"])
+@pytest.mark.parametrize("frames", [1, 3, 9, 18])
+def test_interrupts_keep_the_recording_at_any_moment(videos: Path, frames: int, rest_shape: str) -> None:
+    words = Session(config(videos, rest_shape=rest_shape), Impatient(frames)).run()
+    assert words["interrupted"] is True
+    assert words["frames"] == frames
+    verify(Path("run.rrd"))
+
+
+def test_a_failed_run_leaves_nothing(videos: Path, here: Path) -> None:
+    files = {"tracks_out": Path("tracks.npz"), "shapes_out": Path("shapes.npz")}
+    with pytest.raises(ReconstructionError, match="cannot recover a rest shape"):
+        Session(config(videos, ":5", "rigid", **files), Progress()).run()
+    assert list(here.iterdir()) == []
+
+
+def test_an_interrupt_without_a_shape_writes_the_tracks_it_has(videos: Path) -> None:
+    files = {"tracks_out": Path("tracks.npz"), "shapes_out": Path("shapes.npz")}
+    words = Session(config(videos, rest_shape="rigid", **files), Impatient(3)).run()
+    assert words["rest_shape"] is None
+    with np.load("tracks.npz") as tracks:
+        assert len(tracks["W"]) == 3
+    assert not Path("shapes.npz").exists()
+
+
+def test_existing_files_are_noticed_before_the_work(videos: Path) -> None:
+    Path("shapes.npz").write_text("somebody's work")
+    with pytest.raises(UsageError, match=r"shapes\.npz exists"):
+        Session(config(videos, shapes_out=Path("shapes.npz")), Progress())
+    assert Path("shapes.npz").read_text() == "somebody's work"
+
+
+@pytest.mark.parametrize(
+    ("source", "name"),
+    [
+        ("paper.mp4", "paper"),
+        ("/a/b/paper.mov", "paper"),
+        ("0", "camera0"),
+        ("frames/img%04d.png", "img04d"),
+        ("http://host/clip.mp4?x=1", "clip"),
+    ],
+)
+def test_recordings_are_named_after_their_source(source: str, name: str, here: Path) -> None:
+    assert free_name(here, source) == here / f"{name}.rrd"
+    (here / f"{name}.rrd").touch()
+    (here / f"{name}-2.rrd").touch()
+    assert free_name(here, source) == here / f"{name}-3.rrd"
+
+
+def test_priors_are_recorded_as_they_were_asked_for_and_as_they_were(videos: Path) -> None:
+    asked = config(videos)
+    words = Session(replace(asked, model=replace(asked.model, priors="rest=0.5, scale=0")), Progress()).run()
+    playback = Playback.load(Path("run.rrd"))
+    assert playback.configuration["priors"] == "rest=0.5, scale=0"
+    assert playback.summary is not None
+    assert playback.summary["priors"] == words["priors"]
+    assert words["priors"] == {
+        "rest": 0.5, "smoothness": 1e-4, "rotation": 3e-4, "translation": 0.0, "scale": 0.0, "inextensibility": 1.0,
+    }  # fmt: skip
+
+
+def test_a_switch_of_branches_is_told_and_counted(
+    videos: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    advance = SlidingWindow.advance
+
+    def switching(self: SlidingWindow, W: np.ndarray, visible: np.ndarray) -> ShapeEstimate:
+        estimate = advance(self, W, visible)
+        return replace(estimate, switch=Switch(-0.5, 0.0, 0.62)) if estimate.frame == 4 else estimate
+
+    monkeypatch.setattr(SlidingWindow, "advance", switching)
+    words = Session(config(videos, "7:25"), Progress()).run()
+    told = "bent back at frame 11: energy 0.62 of the other branch"
+    assert words["branch_switches"] == 1
+    assert told in capsys.readouterr().err
+    events = [(frame, level, text) for frame, _, level, text in Playback.load(Path("run.rrd")).events]
+    assert (11, "WARN", told) in events

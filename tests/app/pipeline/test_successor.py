@@ -1,0 +1,246 @@
+"""After a cut to something else: it is followed in its own right, unless the object comes back, or nothing moves."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.commands.retexture import retexture
+from app.options.model import Model
+from app.options.retexture import Retexture
+from app.options.run import Output, Run
+from app.pipeline.observer import Observer
+from app.pipeline.parts import beside
+from app.pipeline.session import Session
+from app.pipeline.stopwatch import Stopwatch
+from app.pipeline.successor import AFTER_CUT_S, Successor, for_another
+from app.playback.playback import Playback
+from app.terminal.progress import Progress
+from reconstruction.window.model import Model as Shapes
+from reconstruction.window.model import ShapeEstimate
+from tests.app.terminal import Command, grain, in_own_process, turning, write_video
+from tests.synthetic_run import verify
+from tests.tracking.scene import SIZE, texture
+from tracking.klt import Observation
+from tracking.video import Frame, Video
+
+Image = NDArray[np.uint8]
+
+CUT, FRAMES = 30, 130
+FAST = ("--rest-shape", "plane", "--bootstrap-frames", 5, "--points", 100, "--modes", 5)
+GOOD = (*FAST[:3], 20, *FAST[4:])
+WAIT, SOON = round(30 * AFTER_CUT_S), 15
+RED = np.full((20, 30, 3), (0, 0, 255), np.uint8)
+
+
+@pytest.fixture(scope="module")
+def two_scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One sheet, and after a cut another one."""
+    return scenes(tmp_path_factory.mktemp("scenes") / "scenes.mp4", turning(CUT), another(FRAMES - CUT))
+
+
+@pytest.fixture(scope="module")
+def film(two_scenes: Path) -> Path:
+    """A folder with the results of a run over them, and its words on the terminal."""
+    files = ("--tracks-out", "tracks.npz", "--shapes-out", "shapes.npz")
+    done = in_own_process(two_scenes.parent, "run", two_scenes, "--out", "film.rrd", "--json", *files, *GOOD)
+    assert done.code == 0, done.err
+    (two_scenes.parent / "out.json").write_text(done.out)
+    (two_scenes.parent / "err.txt").write_text(done.err)
+    return two_scenes.parent
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another object after a fraction of the time."""
+    monkeypatch.setattr("app.pipeline.successor.AFTER_CUT_S", SOON / 30)
+    monkeypatch.setattr("app.pipeline.successor.AGAIN_S", SOON / 30)
+
+
+@pytest.fixture(autouse=True)
+def in_folder(here: Path) -> None:
+    """Recordings go to a folder of their own."""
+
+
+def another(frames: int) -> Iterable[Image]:
+    """A sheet that fills the picture: on black, edges of two sheets look alike."""
+    return turning(frames, seed=5, scale=1.2)
+
+
+def scenes(path: Path, *pictures: Iterable[Image]) -> Path:
+    return write_video(path, (picture for scene in pictures for picture in scene))
+
+
+def run(video: Path, bootstrap_frames: int = 5, rest_shape: str = "plane", **output: object) -> dict[str, object]:
+    model = Model(modes=5, bootstrap_frames=bootstrap_frames)
+    written = Output(out=Path("run.rrd"), image="none", **output)  # type: ignore[arg-type]
+    return Session(Run(str(video), points=100, rest_shape=rest_shape, model=model, output=written), Progress()).run()
+
+
+def test_another_object_gets_a_part_with_a_model_of_its_own(film: Path) -> None:
+    words = json.loads((film / "out.json").read_text())
+    assert (words["frames"], words["objects"], words["losses"], words["recoveries"]) == (FRAMES, 2, 1, 0)
+    assert (words["parts"], words["last_part"]) == (2, "film-part2.rrd")
+
+    first, second = (Playback.load(film / name) for name in ("film.rrd", "film-part2.rrd"))
+    begun = int(second.frames[0])
+    assert CUT + WAIT + 20 <= begun <= CUT + WAIT + 25
+    assert [*first.frames, *second.frames] == list(range(FRAMES))
+    assert first.shaped.tolist() == [frame < CUT for frame in range(begun)]
+    assert set(first.phases[CUT:]) == {"lost"}
+    assert second.shaped.all()
+    assert set(second.phases) == {"tracking"}
+    text = f"another object from frame {begun} on: followed since frame"
+    for playback in (first, second):
+        assert [(frame, level) for frame, _, level, said in playback.events if text in said] == [(begun, "WARN")]
+        verify(playback.path)
+    assert (film / "err.txt").read_text().count(text) == 1
+    assert first.summary is not None
+    assert second.summary is not None
+    assert first.summary["rest_shape_note"] == words["rest_shape_note"]
+    assert second.summary["reprojection_rms_px"] < 0.5
+
+    for name, frames in (("", range(begun)), ("-object2", range(begun - 20, FRAMES))):
+        with np.load(film / f"shapes{name}.npz") as shapes, np.load(film / f"tracks{name}.npz") as tracks:
+            assert shapes["frames"].tolist() == list(frames)
+            assert len(tracks["W"]) == len(frames)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "review film-part2.rrd",
+        "review film.rrd film-part2.rrd",
+        "retexture film-part2.rrd --texture red.png --out o.mp4",
+        "export film-part2.rrd --format glb --out o.glb",
+        "export film-part2.rrd --format mp4 --out o.mp4",
+        "modes film-part2.rrd --out o.png",
+        "evaluate tracks-object2.npz --rest-shape plane --modes 5",
+    ],
+)
+def test_a_part_is_as_good_as_any_recording(modeshape: Command, film: Path, command: str) -> None:
+    cv2.imwrite("red.png", RED)
+    done = modeshape(*(film / word if (film / word).is_file() else word for word in command.split()))
+    assert done.code == 0, done.err
+
+
+def test_an_object_that_comes_back_in_time_keeps_its_model(tmp_path: Path) -> None:
+    video = scenes(tmp_path / "v.mp4", turning(45), another(WAIT + 20), turning(20))
+    words = run(video, bootstrap_frames=40)
+    assert (words["objects"], words["losses"], words["recoveries"]) == (1, 1, 1)
+    assert "parts" not in words
+    playback = Playback.load(Path("run.rrd"))
+    assert playback.shaped[-15:].all()
+    assert playback.frames.tolist() == list(range(45 + WAIT + 40))
+
+
+@pytest.mark.usefixtures("impatient")
+def test_what_stands_still_is_no_object(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    words = run(scenes(tmp_path / "v.mp4", turning(10), (grain(texture(5), rng) for _ in range(60))))
+    assert (words["objects"], words["frames_lost"]) == (1, 60)
+
+
+@pytest.mark.usefixtures("impatient")
+def test_without_corners_it_is_tried_again(tmp_path: Path) -> None:
+    white = [np.full((*SIZE[::-1], 3), 255, np.uint8)] * (SOON + 10)
+    words = run(scenes(tmp_path / "v.mp4", turning(10), white, another(40)))
+    assert words["objects"] == 2
+    assert Playback.load(Path("run-part2.rrd")).frames[0] <= 10 + SOON + 10 + SOON + 15
+
+
+@pytest.mark.usefixtures("impatient")
+def test_one_that_gives_no_rest_shape_costs_nothing(tmp_path: Path) -> None:
+    moved = (np.roll(texture(5), shift, axis=1) for shift in range(60))
+    words = run(scenes(tmp_path / "v.mp4", turning(15), moved), rest_shape="rigid", bootstrap_frames=10)
+    assert (words["objects"], words["rest_shape"]) == (1, "rigid")
+    assert Playback.load(Path("run.rrd")).shaped.sum() == 15
+
+
+@pytest.mark.usefixtures("impatient")
+def test_an_object_lost_before_it_has_a_model_settles_for_what_there_was(tmp_path: Path) -> None:
+    words = run(scenes(tmp_path / "v.mp4", turning(8), another(50)), bootstrap_frames=10)
+    assert (words["objects"], words["bootstrap_frames"]) == (2, 8)
+    assert Playback.load(Path("run.rrd")).shaped.sum() == 8
+    assert Playback.load(Path("run-part2.rrd")).shaped.all()
+
+
+def test_parts_of_an_earlier_run_are_kept_or_replaced(here: Path) -> None:
+    first, second = here / "run.rrd", here / "run-part2.rrd"
+    assert beside(first, "part2", overwrite=False) == second
+    second.touch()
+    assert beside(first, "part2", overwrite=False) == here / "run-part2-2.rrd"
+    assert beside(first, "part2", overwrite=True) == second
+
+
+class Follower(Observer):
+    """Notes what it is told."""
+
+    def __init__(self) -> None:
+        self.begun: list[tuple[int, int]] = []
+        self.frames: list[tuple[int, bool]] = []
+
+    def begin(self, first: Frame, points_px: NDArray[np.float64], model: Shapes, fps: float) -> None:  # noqa: ARG002
+        self.begun.append((first.index, len(self.frames)))
+
+    def frame(self, frame: Frame, observation: Observation, estimate: ShapeEstimate | None) -> None:
+        assert estimate is None or len(estimate.visible) == len(observation.visible)
+        self.frames.append((frame.index, estimate is not None))
+
+
+def test_who_follows_a_run_hears_of_both(two_scenes: Path) -> None:
+    follower = Follower()
+    config = Run(str(two_scenes), points=100, rest_shape="plane", model=Model(modes=5, bootstrap_frames=5))
+    Session(config, Progress(), follower).run()
+    (first, before), (second, between) = follower.begun
+    assert (first, before) == (0, 0)
+    assert second >= CUT + WAIT
+    assert [index for index, _ in follower.frames] == list(range(FRAMES))
+    assert [shaped for _, shaped in follower.frames] == [not CUT <= index < between for index in range(FRAMES)]
+
+
+def test_a_picture_stays_on_the_object_it_was_put_on(two_scenes: Path) -> None:
+    cv2.imwrite("red.png", RED)
+    model = Model(modes=5, bootstrap_frames=5)
+    command = Retexture(
+        source=str(two_scenes), texture=Path("red.png"), out=Path("o.mp4"), points=100, rest_shape="plane", model=model
+    )
+    words = retexture(command, Progress())
+    assert (words["objects"], words["painted_frames"]) == (2, CUT)
+    with Video("o.mp4") as video:
+        assert sum(1 for _ in video) == FRAMES
+
+
+def test_a_batch_keeps_the_parts(modeshape: Command, two_scenes: Path, here: Path) -> None:
+    done = modeshape("batch", two_scenes, "--out", "out", "--json", f"--options={' '.join(map(str, FAST))} --image none")
+    assert done.code == 0, done.err
+    assert json.loads(done.out)["videos"][0]["last_part"] == str(here / "out" / "scenes-part2.rrd")
+    assert sorted(path.name for path in Path("out").glob("*.rrd")) == ["scenes-part2.rrd", "scenes.rrd"]
+    assert not Path("out", "unfinished").exists()
+
+
+@pytest.mark.parametrize(("cut", "wait_s"), [(True, 2.0), (False, 10.0)])
+def test_what_is_covered_has_longer_than_what_was_cut(cut: bool, wait_s: float) -> None:
+    config = Run("video.mp4", points=100, rest_shape="plane", model=Model(modes=5, bootstrap_frames=5))
+    pictures = list(another(60))
+    successor = Successor(config, Frame(0, 100.0, pictures[0]), Stopwatch(), cut=cut)
+    for index, picture in enumerate(pictures):
+        successor.look(Frame(index, 100.0 + wait_s - 1.0 + index / 30, picture))
+        if successor.take:
+            break
+    assert successor.take is not None
+    assert successor.take.first.index == 30
+
+
+def test_what_was_said_of_the_first_object_does_not_go_for_another() -> None:
+    output = Output(tracks_out=Path("a/t.npz"), image="video")
+    config = Run(
+        "v.mp4", rest_shape="m.obj", ground_truth=Path("g.npz"), texture=Path("t.png"), roi=(1, 2, 3, 4), output=output
+    )
+    other = for_another(config, 3)
+    assert (other.rest_shape, other.ground_truth, other.texture, other.roi) == ("auto", None, None, (1, 2, 3, 4))
+    assert other.output == Output(tracks_out=Path("a/t-object3.npz"), image="jpeg")

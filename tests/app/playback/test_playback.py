@@ -1,0 +1,294 @@
+import contextlib
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import rerun as rr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from app.options.model import Model
+from app.options.run import Output, Run
+from app.pipeline.session import Session
+from app.playback.chunks import complete_bytes
+from app.playback.playback import Playback
+from app.recording.recording import FLUSH_FRAMES, Recording
+from app.terminal.errors import UsageError
+from app.terminal.progress import Progress
+from reconstruction.camera import Camera
+from tests.synthetic_run import MODES, SIZE, STAGE_MS, write_run
+from tracking.klt import Observation
+from tracking.video import Frame, Video
+
+ROOT = Path(__file__).parents[3]
+ORTHOGRAPHIC = Camera(center_px=np.array([80.0, 60.0]))
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+import numpy as np
+from app.recording.recording import FLUSH_FRAMES, Recording
+from tracking.klt import Observation
+from tracking.video import Frame
+
+recording = Recording(Path(sys.argv[1]), configuration={"modes": 4}, size=(160, 120))
+for index in range(FLUSH_FRAMES + 5):
+    points = np.full((5, 2), float(index))
+    observation = Observation(points, np.ones(5, bool))
+    recording.observe(Frame(index, index / 30, np.zeros((120, 160, 3), np.uint8)), observation, phase="bootstrap")
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.fixture(scope="module")
+def long_recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Several flushes long."""
+    return write_run(tmp_path_factory.mktemp("long") / "long.rrd", frames=250).path
+
+
+@pytest.mark.parametrize("camera", [None, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
+def test_what_was_written_is_read(tmp_path: Path, camera: Camera | None) -> None:
+    run = write_run(tmp_path / "sheet.rrd", camera=camera)
+    playback = Playback.load(run.path)
+    assert (playback.name, playback.version, playback.notes) == ("sheet", "0.1.0", ())
+    assert playback.configuration == {"source": "sheet.mp4", "modes": MODES}
+    assert playback.summary == {"frames": 6, "e3d": 0.03}
+    assert playback.frames.tolist() == list(range(6))
+    assert np.allclose(playback.times_s, np.arange(6) / 30, atol=1e-9)
+    assert playback.phases == ["bootstrap"] * 2 + ["tracking"] * 4
+    assert list(playback.stage_ms) == list(STAGE_MS)
+    assert [values.tolist() for values in playback.stage_ms.values()] == [[value] * 6 for value in STAGE_MS.values()]
+    assert [(frame, level, text) for frame, _, level, text in playback.events] == [(2, "INFO", "rest shape: plane")]
+    assert playback.visible.tolist() == [o.visible.tolist() for o in run.observations]
+    observed = np.stack([o.points_px.T for o in run.observations])
+    assert np.allclose(playback.W, observed, atol=1e-4, equal_nan=True)
+    assert playback.size == SIZE
+    assert playback.camera.perspective == run.camera.perspective
+    assert np.array_equal(playback.mesh.faces, run.mesh.faces)
+    assert np.array_equal(playback.mesh.edges, run.mesh.edges)
+    for name in ("rest", "Upsilon", "eigenvalues", "Phi"):
+        assert np.array_equal(getattr(playback.basis, name), getattr(run.basis, name))
+    assert np.array_equal(playback.texture_px, run.pixels)
+    x, y = playback.texture_origin
+    height, width = playback.texture_bgr.shape[:2]
+    assert np.array_equal(playback.texture_bgr, run.picture[y : y + height, x : x + width])
+
+
+@pytest.mark.parametrize("camera", [None, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
+def test_shapes_are_exact(tmp_path: Path, camera: Camera | None) -> None:
+    run = write_run(tmp_path / "sheet.rrd", camera=camera)
+    playback = Playback.load(run.path)
+    shapes = playback.shapes()
+    assert playback.shaped.all()
+    for i, written in enumerate(run.estimates):
+        read = playback.estimate(i)
+        assert read is not None
+        assert np.array_equal(read.Lambda, written.Lambda) or np.allclose(read.Lambda, written.Lambda, atol=1e-12)
+        assert np.allclose(read.R, written.R, atol=1e-12)
+        assert np.allclose(read.shape, written.shape, atol=1e-9)
+        assert np.allclose(shapes[i], written.shape, atol=1e-9)
+        assert np.allclose(read.projection_px, written.projection_px, atol=1e-9)
+        assert np.allclose(read.residual_px, written.residual_px, atol=1e-4, equal_nan=True)
+
+
+def test_of_a_frame_that_is_estimated_again_the_last_counts(tmp_path: Path) -> None:
+    path = tmp_path / "again.rrd"
+    run = write_run(tmp_path / "sheet.rrd")
+    with Recording(path, configuration={}, size=SIZE) as recording:
+        for index in range(3):
+            recording.observe(Frame(index, index / 30, run.picture), run.observations[0], phase="tracking")
+        recording.rest(
+            run.basis, run.mesh.faces, run.mesh.edges, run.camera, texture_bgr=run.picture, texture_px=run.pixels
+        )
+        for index in (2, 1, 1, 2, 1):  # out of order, too
+            recording.estimate(index, index / 30, run.estimates[index])
+        corrected = replace(run.estimates[1], s=0.5, Lambda=run.estimates[1].Lambda + 1)
+        recording.estimate(1, 1 / 30, corrected)
+        recording.event(1, 1 / 30, "first")
+        recording.event(1, 1 / 30, "second", "WARN")
+    playback = Playback.load(path)
+    assert playback.s[1:].tolist() == [0.5, 1.0]
+    assert np.array_equal(playback.Lambda[1], corrected.Lambda)
+    assert playback.shaped.tolist() == [False, True, True]
+    assert playback.estimate(0) is None
+    assert np.isnan(playback.shapes()[0]).all()
+    assert [(level, text) for _, _, level, text in playback.events] == [("INFO", "first"), ("WARN", "second")]
+
+
+def test_frames_without_a_single_point_seen(tmp_path: Path) -> None:
+    path = tmp_path / "dark.rrd"
+    picture = np.zeros((120, 160, 3), np.uint8)
+    with Recording(path, configuration={}, size=SIZE) as recording:
+        for index, seen in enumerate((True, False, True)):
+            points = np.full((4, 2), 7.0 if seen else np.nan)
+            recording.observe(Frame(index, index / 30, picture), Observation(points, np.full(4, seen)), phase="lost")
+    playback = Playback.load(path)
+    assert playback.visible.any(axis=1).tolist() == [True, False, True]
+    assert np.isnan(playback.W[1]).all()
+
+
+def test_pictures_come_one_by_one(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "sheet.rrd")
+    pictures = dict(Playback.load(run.path).images())
+    assert list(pictures) == list(range(6))
+    for picture in pictures.values():
+        assert picture is not None
+        assert cv2.PSNR(picture, run.picture) > 30
+
+
+def test_without_pictures(tmp_path: Path) -> None:
+    run = write_run(tmp_path / "sheet.rrd", image="none")
+    assert list(Playback.load(run.path).images()) == [(i, None) for i in range(6)]
+
+
+def test_run_without_a_model(tmp_path: Path) -> None:
+    """As after a run that ended while it bootstrapped."""
+    run = write_run(tmp_path / "early.rrd", frames=4, first_shape=9)
+    playback = Playback.load(run.path)
+    assert playback.modelled is None
+    assert not playback.shaped.any()
+    assert "contains no shapes" in " ".join(playback.notes)
+    for use in (
+        playback.need_model,
+        playback.shapes,
+        lambda: playback.estimate(0),
+        lambda: playback.basis,
+        lambda: playback.texture_bgr,
+    ):
+        with pytest.raises(UsageError, match=r"early\.rrd contains no model.*--rest-shape plane"):
+            use()
+    assert sum(picture is not None for _, picture in playback.images()) == 4
+
+
+def test_killed_run(tmp_path: Path) -> None:
+    path = tmp_path / "killed.rrd"
+    done = subprocess.run([sys.executable, "-c", KILLED, path], cwd=ROOT, check=False)
+    assert done.returncode == -9
+    playback = Playback.load(path)
+    assert len(playback.frames) >= FLUSH_FRAMES
+    assert playback.frames.tolist() == list(range(len(playback.frames)))
+    assert playback.configuration == {"modes": 4}
+    assert playback.summary is None
+    assert "no summary" in playback.notes[0]
+    assert len([picture for _, picture in playback.images() if picture is not None]) == len(playback.frames)
+
+
+def test_file_that_is_cut_off(tmp_path: Path, long_recording: Path) -> None:
+    whole = long_recording.read_bytes()
+    path = tmp_path / "cut.rrd"
+    with long_recording.open("rb") as file:
+        between = complete_bytes(file, int(0.6 * len(whole)))
+    path.write_bytes(whole[: between + 40])  # in the middle of a message
+    before = path.read_bytes()
+    playback, complete = Playback.load(path), Playback.load(long_recording)
+    count = len(playback.frames)
+    assert 50 < count < 250
+    assert f"{count} frames, up to number {count - 1}, could be read" in playback.notes[0]
+    assert np.array_equal(playback.frames, complete.frames[:count])
+    assert np.array_equal(playback.W, complete.W[:count], equal_nan=True)
+    both = playback.shaped
+    assert both.sum() > 50
+    assert np.array_equal(playback.shapes()[both], complete.shapes()[:count][both])
+    assert path.read_bytes() == before
+
+
+@settings(max_examples=25)
+@given(share=st.floats(0.0, 0.999))
+def test_cut_anywhere_it_is_read_or_refused(
+    tmp_path_factory: pytest.TempPathFactory, long_recording: Path, share: float
+) -> None:
+    whole = long_recording.read_bytes()
+    path = tmp_path_factory.mktemp("cut") / "cut.rrd"
+    path.write_bytes(whole[: int(share * len(whole))])
+    with contextlib.suppress(UsageError):  # any other exception fails
+        playback = Playback.load(path)
+        assert len(playback.frames) <= 250
+        assert len(list(playback.images())) == len(playback.frames)
+
+
+def foreign(path: Path) -> None:
+    stream = rr.RecordingStream("somebody_elses")
+    stream.save(path)
+    stream.log("points", rr.Points3D([[1, 2, 3]]))
+    stream.flush()
+    stream.disconnect()
+
+
+def scrambled(path: Path) -> None:
+    data = bytearray(write_run(path.with_name("whole.rrd")).path.read_bytes())
+    data[2000:-2000:7] = bytes(len(data[2000:-2000:7]))
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda _: None, "there is no recording"),
+        (lambda path: path.mkdir(), "there is no recording"),
+        (lambda path: path.touch(), "is not a recording"),
+        (lambda path: path.write_text("dear diary"), "is not a recording"),
+        (lambda path: path.write_bytes(b"\0\0\0\x18ftypmp42" + bytes(999)), "is not a recording"),
+        (lambda path: path.write_bytes(b"RRF2" + bytes(3)), "contains no recording|is damaged"),
+        (foreign, "recording of another application .somebody_elses."),
+        (scrambled, "is damaged|contains no|cannot be read|cannot read|can read"),
+    ],
+    ids=["missing", "folder", "empty", "text", "mp4", "stub", "foreign", "scrambled"],
+)
+def test_what_is_no_recording(tmp_path: Path, make: object, words: str) -> None:
+    path = tmp_path / "it.rrd"
+    make(path)  # type: ignore[operator]
+    with pytest.raises(UsageError, match=rf"it\.rrd.*({words})|({words}).*it\.rrd"):
+        Playback.load(path)
+
+
+def test_recording_of_an_older_format(tmp_path: Path) -> None:
+    path = tmp_path / "old.rrd"
+    stream = rr.RecordingStream("modeshape")
+    stream.save(path)
+    stream.set_time("frame", sequence=0)
+    values = rr.DynamicArchetype("modeshape.Observation", components={"visible": [True, True], "phase": "tracking"})
+    stream.log("observation", values)
+    stream.log("world/camera/points/seen", rr.Points2D([[1, 2]]))
+    stream.flush()
+    stream.disconnect()
+    with pytest.raises(UsageError, match=r"old\.rrd is not a recording that this version of modeshape can read"):
+        Playback.load(path)
+
+
+@pytest.mark.parametrize("image", ["jpeg", "video"])
+def test_real_run(tmp_path: Path, shared_data: Path, image: str) -> None:
+    """Shapes agree with --shapes-out, and pictures with the video's frames."""
+    source, shapes, out = shared_data / "kinect_paper.mp4", tmp_path / "shapes.npz", tmp_path / "run.rrd"
+    config = Run(
+        source=str(source),
+        roi=(195, 95, 325, 265),
+        frames="10:26",
+        rest_shape="plane",
+        points=300,
+        model=Model(bootstrap_frames=8),
+        output=Output(out=out, shapes_out=shapes, image=image),  # type: ignore[arg-type]
+    )
+    summary = Session(config, Progress()).run()
+    playback = Playback.load(out)
+    assert playback.summary is not None
+    assert playback.summary["frames"] == summary["frames"] == 16
+    with np.load(shapes) as saved:
+        assert playback.frames.tolist() == saved["frames"].tolist() == list(range(10, 26))
+        assert np.allclose(playback.shapes(), saved["S"], rtol=1e-9, atol=1e-9)
+        for name in ("t", "s", "Lambda", "visible"):
+            assert np.array_equal(getattr(playback, name), saved[name]), name
+        for name in ("rest", "Upsilon", "eigenvalues", "Phi"):
+            assert np.array_equal(getattr(playback.basis, name), saved[name]), name
+        assert np.array_equal(playback.mesh.faces, saved["faces"])
+        assert np.array_equal(playback.camera.K, saved["K"])
+    residuals = [estimate.residual_px for i in range(16) if (estimate := playback.estimate(i))]
+    rms = np.sqrt(np.nanmean(np.square(residuals)))
+    assert rms == pytest.approx(summary["reprojection_rms_px"], rel=1e-4)
+    with Video(str(source), 10, 26) as video:
+        for (_, picture), frame in zip(playback.images(), video, strict=True):
+            assert picture is not None
+            assert cv2.PSNR(picture, frame.image) > 30

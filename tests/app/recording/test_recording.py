@@ -1,0 +1,313 @@
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+os.environ["RERUN_ANALYTICS"] = "0"
+
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from app.recording.recording import Recording, entities
+from app.terminal.errors import UsageError
+from reconstruction.camera import Camera
+from tests.synthetic_run import MODES, SIZE, STAGE_MS, Run, picture, verify, write_run
+from tracking.klt import Observation
+from tracking.video import Frame
+
+Rows = dict[tuple[str, str], dict[int | None, Any]]
+
+
+@pytest.fixture(autouse=True)
+def strict() -> Iterator[None]:
+    """Wrongly shaped data only warns otherwise."""
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return write_run(tmp_path_factory.mktemp("run") / "sheet.rrd")
+
+
+@pytest.fixture(scope="module")
+def rows(run: Run) -> Rows:
+    return read(run.path)
+
+
+def read(path: Path) -> Rows:
+    """(entity, component) → frame, None for static → value; the last row of a frame counts."""
+    values: Rows = {}
+    for chunk in RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        names = batch.schema.names
+        frames = batch[entities.FRAME].to_pylist() if entities.FRAME in names else [None] * batch.num_rows
+        if entities.TIME in names:  # nanoseconds as numbers: Python's timedelta has none
+            batch = batch.set_column(names.index(entities.TIME), entities.TIME, batch[entities.TIME].cast("int64"))
+        for name in set(names) - {"rerun.controls.RowId", entities.FRAME}:
+            for frame, value in zip(frames, batch[name].to_pylist(), strict=True):
+                if value is not None:
+                    values.setdefault((chunk.entity_path.strip("/"), name), {})[frame] = value
+    return values
+
+
+def record(path: Path | None, **options: Any) -> Recording:
+    return Recording(path, configuration={}, size=SIZE, **options)
+
+
+def frame(index: int = 0) -> tuple[Frame, Observation]:
+    return Frame(index, index / 30, picture()), Observation(np.full((5, 2), 10.0), np.ones(5, bool))
+
+
+def test_rerun_accepts_the_file(run: Run) -> None:
+    verify(run.path)
+
+
+def test_timelines_are_frame_and_time(rows: Rows) -> None:
+    assert list(rows[entities.OBSERVATION, "modeshape.Observation:phase"]) == list(range(6))
+    times = rows[entities.OBSERVATION, entities.TIME]
+    assert times == {index: pytest.approx(index / 30 * 1e9, abs=1) for index in range(6)}
+    assert not any(name in ("log_time", "log_tick") for _, name in rows)
+
+
+def test_estimates_come_back_exactly(run: Run, rows: Rows) -> None:
+    for index, estimate in enumerate(run.estimates):
+        for name, value in (
+            ("quaternion", estimate.quaternion),
+            ("t", estimate.t),
+            ("s", [estimate.s]),
+            ("Lambda", estimate.Lambda.ravel()),
+            ("visible", estimate.visible),
+        ):
+            np.testing.assert_array_equal(rows[entities.ESTIMATE, f"modeshape.Estimate:{name}"][index], value)
+        vertices = np.array(rows[entities.MESH, "Mesh3D:vertex_positions"][index])
+        np.testing.assert_allclose(vertices, estimate.shape.T, rtol=1e-6, atol=1e-5)
+
+
+def test_observations_come_back(run: Run, rows: Rows) -> None:
+    for index, observation in enumerate(run.observations):
+        visible = np.array(rows[entities.OBSERVATION, "modeshape.Observation:visible"][index])
+        np.testing.assert_array_equal(visible, observation.visible)
+        seen = np.full((len(visible), 2), np.nan)
+        seen[visible] = rows[entities.SEEN, "Points2D:positions"][index]
+        np.testing.assert_allclose(seen, observation.points_px, rtol=1e-6)
+    phases = rows[entities.OBSERVATION, "modeshape.Observation:phase"]
+    assert [phase for [phase] in phases.values()] == ["bootstrap"] * 2 + ["tracking"] * 4
+
+
+def test_reprojected_mesh_is_found_by_its_strips(run: Run, rows: Rows) -> None:
+    strips = np.array(rows[entities.MODEL, "modeshape.Model:strips"][None])
+    for index, estimate in enumerate(run.estimates):
+        drawn = np.concatenate(rows[entities.WIREFRAME, "LineStrips2D:strips"][index])
+        np.testing.assert_allclose(drawn, estimate.projection_px[strips[strips >= 0]], rtol=1e-6)
+
+
+def test_the_model_is_complete(run: Run, rows: Rows) -> None:
+    for name, value in (
+        ("rest", run.basis.rest.ravel()),
+        ("Upsilon", run.basis.Upsilon.ravel()),
+        ("eigenvalues", run.basis.eigenvalues),
+        ("Phi", run.basis.Phi.ravel()),
+        ("faces", run.mesh.faces.ravel()),
+        ("edges", run.mesh.edges.ravel()),
+        ("texture_px", run.pixels.ravel()),
+        ("size", SIZE),
+        ("perspective", [True]),
+        ("focal_px", [200.0]),
+        ("center_px", [80.0, 60.0]),
+    ):
+        np.testing.assert_array_equal(rows[entities.MODEL, f"modeshape.Model:{name}"][None], value)
+
+
+def test_the_texture_is_the_first_frame(run: Run, rows: Rows) -> None:
+    [layout] = rows[entities.MESH, "Mesh3D:albedo_texture_format"][None]
+    [buffer] = rows[entities.MESH, "Mesh3D:albedo_texture_buffer"][None]
+    image = np.array(buffer, np.uint8).reshape(layout["height"], layout["width"], 3)
+    uv = np.array(rows[entities.MESH, "Mesh3D:vertex_texcoords"][None])
+    texels = np.floor(uv * [layout["width"], layout["height"]]).astype(int)
+    pixels = np.floor(run.pixels + 0.5).astype(int)
+    np.testing.assert_array_equal(image[texels[:, 1], texels[:, 0], ::-1], run.picture[pixels[:, 1], pixels[:, 0]])
+
+
+def test_frames_are_pictures(run: Run, rows: Rows) -> None:
+    [blob] = rows[entities.IMAGE, "EncodedImage:blob"][5]
+    decoded = cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_COLOR)
+    assert decoded is not None
+    assert np.abs(decoded.astype(int) - run.picture).mean() < 4
+
+
+def test_points_are_lost_until_a_shape_predicts_them(run: Run, rows: Rows, tmp_path: Path) -> None:
+    hidden = ~run.estimates[1].visible
+    predicted = rows[entities.PREDICTED, "Points2D:positions"][1]
+    np.testing.assert_allclose(predicted, run.estimates[1].projection_px[hidden], rtol=1e-6)
+    assert rows[entities.LOST, "Points2D:positions"][1] == []
+
+    shapeless = read(write_run(tmp_path / "shapeless.rrd", frames=2, first_shape=9).path)
+    lost = shapeless[entities.LOST, "Points2D:positions"][1]
+    np.testing.assert_allclose(lost, run.observations[0].points_px[hidden], rtol=1e-6)
+
+
+def test_a_lost_surface_leaves_no_mesh_on_the_picture(tmp_path: Path) -> None:
+    path = tmp_path / "lost.rrd"
+    run = write_run(path, frames=3, first_shape=0)
+    with record(path, overwrite=True) as recording:
+        recording.rest(
+            run.basis, run.mesh.faces, run.mesh.edges, run.camera, texture_bgr=run.picture, texture_px=run.pixels
+        )
+        recording.observe(Frame(0, 0.0, run.picture), run.observations[0], phase="tracking")
+        recording.estimate(0, 0.0, run.estimates[0])
+        nothing = Observation(np.full_like(run.pixels, np.nan), np.zeros(len(run.pixels), bool))
+        recording.observe(Frame(1, 1 / 30, run.picture), nothing, phase="lost")
+    rows = read(path)
+    assert rows[entities.WIREFRAME, "LineStrips2D:strips"][1] == []
+    assert rows[entities.PREDICTED, "Points2D:positions"][1] == []
+    assert len(rows[entities.LOST, "Points2D:positions"][1]) == len(run.pixels)
+
+
+def test_curves(run: Run, rows: Rows) -> None:
+    np.testing.assert_allclose(rows[entities.ERROR, "Scalars:scalars"][3], np.sqrt([0.5, 0.5]))
+    np.testing.assert_allclose(rows[entities.VISIBLE, "Scalars:scalars"][1], [run.observations[1].visible.mean()])
+    for stage, milliseconds in STAGE_MS.items():
+        assert rows[f"{entities.TIMING}/{stage}", "Scalars:scalars"][4] == [milliseconds]
+    assert len(rows[entities.LEADING, "Scalars:scalars"][3]) == 9
+    assert rows[entities.EVENTS, "TextLog:text"] == {2: ["rest shape: plane"]}
+
+
+def test_configuration_version_and_summary(rows: Rows) -> None:
+    [configuration] = rows[entities.CONFIGURATION, "modeshape.Document:json"][None]
+    [summary] = rows[entities.SUMMARY, "modeshape.Document:json"][None]
+    assert json.loads(configuration) == {"source": "sheet.mp4", "modes": MODES}
+    assert json.loads(summary) == {"frames": 6, "e3d": 0.03}
+    assert rows[entities.CONFIGURATION, "modeshape.Document:version"][None] == [version("modeshape")]
+
+
+def test_an_orthographic_camera_has_no_pinhole(tmp_path: Path) -> None:
+    rows = read(write_run(tmp_path / "flat.rrd", camera=Camera(np.inf, np.array([80.0, 60.0]))).path)
+    assert rows[entities.MODEL, "modeshape.Model:perspective"][None] == [False]
+    assert not any(entity == entities.CAMERA for entity, _ in rows)
+
+
+def test_a_file_is_not_replaced_silently(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "kept.rrd"
+    path.write_bytes(run.path.read_bytes())
+    with pytest.raises(UsageError, match=r"kept\.rrd exists: .*--overwrite.*--out"):
+        record(path)
+    assert path.read_bytes() == run.path.read_bytes()
+    with record(path, overwrite=True) as recording:
+        recording.observe(*frame(), phase="tracking")
+    verify(path)
+    assert path.stat().st_size < run.path.stat().st_size
+
+
+def fail(path: Path, error: type[BaseException], run: Run | None = None) -> None:
+    """A run that ends in an error after its first frame, whose shape is known if it is that of `run`."""
+    with record(path) as recording:
+        recording.observe(*frame(), phase="tracking")
+        if run:
+            recording.rest(
+                run.basis, run.mesh.faces, run.mesh.edges, run.camera, texture_bgr=picture(), texture_px=run.pixels
+            )
+            recording.estimate(0, 0.0, run.estimates[0])
+        raise error
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_a_run_that_fails_leaves_a_complete_file(run: Run, tmp_path: Path, error: type[BaseException]) -> None:
+    path = tmp_path / "failed.rrd"
+    with pytest.raises(error):
+        fail(path, error, run)
+    verify(path)
+    assert (entities.SEEN, "Points2D:positions") in read(path)
+
+
+def test_a_run_that_fails_without_a_shape_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError):
+        fail(tmp_path / "failed.rrd", RuntimeError)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_run_is_kept_without_a_shape(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        fail(tmp_path / "interrupted.rrd", KeyboardInterrupt)
+    verify(tmp_path / "interrupted.rrd")
+
+
+def test_a_run_without_a_frame_leaves_no_file(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "empty.rrd"
+    with record(path):
+        assert path.exists()
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("options", [{"connect": "127.0.0.1:1"}, {"connect": "nonsense://x"}, {"connect": "a:b"}])
+def test_an_absent_viewer_is_an_error_and_leaves_no_file(tmp_path: Path, options: dict[str, str]) -> None:
+    with pytest.raises(UsageError, match=r"--connect|no viewer answers at 127\.0\.0\.1:1"):
+        record(tmp_path / "x.rrd", **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unwritable_place_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match=r"cannot write .*x\.rrd: .*--out"):
+        record(tmp_path / "file" / "x.rrd")
+    with pytest.raises(UsageError, match="--out"):
+        record(tmp_path, overwrite=True)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+def test_a_full_disk_is_an_error() -> None:
+    with pytest.raises(UsageError, match="cannot write /dev/full"):
+        record(Path("/dev/full"), overwrite=True)
+
+
+def test_without_file_and_viewer_nothing_happens() -> None:
+    with record(None) as recording:
+        recording.observe(*frame(), phase="tracking")
+        recording.timing(0, 0.0, STAGE_MS)
+        recording.summary({})
+    assert recording.path is None
+
+
+def test_the_video_file_can_stand_for_the_pictures(shared_data: Path, tmp_path: Path) -> None:
+    video = shared_data / "kinect_paper.mp4"
+    path = tmp_path / "video.rrd"
+    with record(path, image="video", video=video) as recording:
+        for index in range(3):
+            recording.observe(*frame(index), phase="tracking")
+    rows = read(path)
+    [blob] = rows[entities.IMAGE, "AssetVideo:blob"][None]
+    assert bytes(blob) == video.read_bytes()
+    stamps = rows[entities.IMAGE, "VideoFrameReference:timestamp"]
+    assert [stamps[index][0] for index in range(3)] == sorted({stamps[index][0] for index in range(3)})
+
+
+def test_a_video_that_cannot_be_stored_is_an_error(tmp_path: Path) -> None:
+    text = tmp_path / "text.mp4"
+    text.write_text("not a video")
+    for video in (None, text, tmp_path / "missing.mp4"):
+        with pytest.raises(UsageError, match="--image jpeg"):
+            record(tmp_path / "x.rrd", image="video", video=video)
+    assert not (tmp_path / "x.rrd").exists()
+
+
+def test_no_pictures_makes_a_small_file(tmp_path: Path, run: Run) -> None:
+    small = write_run(tmp_path / "none.rrd", image="none")
+    assert (entities.IMAGE, "EncodedImage:blob") not in read(small.path)
+    assert small.path.stat().st_size < run.path.stat().st_size
+
+
+def test_rerun_says_nothing_on_the_terminal(tmp_path: Path) -> None:
+    target = tmp_path / "quiet.rrd"
+    code = f"from pathlib import Path; from tests.synthetic_run import write_run; write_run(Path({str(target)!r}))"
+    root = Path(__file__).parents[3]
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, check=True)
+    assert done.stdout == done.stderr == b""

@@ -1,0 +1,50 @@
+"""Starting a viewer: for this machine only, and told when it does not start."""
+
+import socket
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from app.recording import viewer
+from app.terminal.errors import UsageError
+
+LISTENS = """
+import socket, sys, time
+options = dict(zip(sys.argv[1::2], sys.argv[2::2]))
+with socket.create_server((options["--bind"], int(options["--port"]))) as server:
+    open(sys.argv[0] + ".bind", "w").write(options["--bind"])
+    server.settimeout(5)
+    for _ in range(20):
+        server.accept()[0].close()
+"""
+
+
+@pytest.fixture
+def program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Where the viewer's program is looked for; and a free port."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        monkeypatch.setattr(viewer, "PORT", free.getsockname()[1])
+    monkeypatch.setattr(viewer, "rerun_cli", SimpleNamespace(__file__=str(tmp_path / "rerun_cli.py")))
+    return tmp_path / "rerun"
+
+
+def test_it_listens_on_this_machine_only(program: Path) -> None:
+    program.write_text(f"#!{sys.executable}\n{LISTENS}")
+    program.chmod(0o755)
+    assert viewer.spawned_viewer() == f"rerun+http://127.0.0.1:{viewer.PORT}/proxy"
+    assert program.with_name("rerun.bind").read_text() == "127.0.0.1"
+
+
+@pytest.mark.parametrize("text", [None, f"#!{sys.executable}\nraise SystemExit(1)\n"])
+def test_one_that_does_not_start_is_told(program: Path, text: str | None) -> None:
+    if text is not None:
+        program.write_text(text)
+        program.chmod(0o755)
+    began = time.monotonic()
+    with pytest.raises(UsageError, match="--view: the viewer does not start"):
+        viewer.spawned_viewer()
+    assert time.monotonic() - began < 10

@@ -1,0 +1,120 @@
+"""Triangulation, unique edges, location in triangles, well-spread points."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull, Delaunay
+
+from reconstruction import ReconstructionError
+from reconstruction.basis.mesh import (
+    Mesh,
+    cross2,
+    farthest_points,
+    locate,
+    mesh_from_faces,
+    smallest_angle,
+    triangulate,
+    unique_edges,
+)
+from tests.reconstruction.world import SEEDS, spread
+
+SIZES = st.integers(4, 60)
+
+
+@given(SEEDS, SIZES)
+def test_every_edge_of_a_triangle_is_there_once(rng: np.random.Generator, count: int) -> None:
+    faces = np.array([rng.choice(20, 3, replace=False) for _ in range(count)])
+    edges = unique_edges(faces)
+    expected = {tuple(sorted((int(f[i]), int(f[i - 1])))) for f in faces for i in range(3)}
+    assert [tuple(e) for e in edges.tolist()] == sorted(expected)
+
+
+@given(SEEDS, SIZES)
+def test_triangulation_is_a_planar_mesh_of_all_points(rng: np.random.Generator, p: int) -> None:
+    points = spread(rng, p).T
+    mesh = triangulate(points)
+    assert np.array_equal(np.unique(mesh.faces), np.arange(p))
+    assert p - len(mesh.edges) + len(mesh.faces) == 1  # Euler: a disk without holes
+    a, b, c = (points[mesh.faces[:, k]] for k in range(3))
+    area = cross2(b - a, c - a) / 2
+    assert (area > 0).all()
+    assert area.sum() <= ConvexHull(points).volume * (1 + 1e-9)
+    np.testing.assert_array_equal(mesh.edges, unique_edges(mesh.faces))
+
+
+def test_slivers_that_bridge_a_dent_are_dropped() -> None:
+    points = np.array([[0.0, 0], [5, 0.1], [10, 0], [10, 5], [5, 5], [0, 5]])
+    assert [0, 1, 2] in np.sort(Delaunay(points).simplices).tolist()
+    faces = triangulate(points).faces
+    assert [0, 1, 2] not in np.sort(faces).tolist()
+    assert np.unique(faces).size == len(points)
+
+
+def test_smallest_angle_of_known_triangles() -> None:
+    points = np.array([[0.0, 0], [1, 0], [0, 1], [0.5, np.sqrt(3) / 2], [2, 0]])
+    angles = np.rad2deg(smallest_angle(points, np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])))
+    np.testing.assert_allclose(angles, [45, 60, 0], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("points", "words"),
+    [(np.zeros((2, 2)), "2 points"), (np.stack([np.arange(5.0), 2 * np.arange(5.0)], axis=1), "on one line")],
+)
+def test_points_without_a_mesh_are_refused(points: np.ndarray, words: str) -> None:
+    with pytest.raises(ReconstructionError, match=words):
+        triangulate(points)
+
+
+@given(SEEDS)
+def test_points_are_located_where_their_weights_say(rng: np.random.Generator) -> None:
+    points = spread(rng, 30).T
+    mesh = triangulate(points)
+    chosen = rng.integers(len(mesh.faces), size=25)
+    weights = rng.dirichlet(np.ones(3), 25)
+    queries = np.einsum("nkd,nk->nd", points[mesh.faces[chosen]], weights)
+    face, found = locate(points, mesh, queries)
+    assert (face >= 0).all()
+    assert (found >= -1e-6).all()
+    np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-9)
+    np.testing.assert_allclose(np.einsum("nkd,nk->nd", points[mesh.faces[face]], found), queries, atol=1e-8)
+    inner = weights.min(axis=1) > 1e-6
+    np.testing.assert_array_equal(face[inner], chosen[inner])
+
+
+def test_vertices_are_inside_and_far_points_are_not() -> None:
+    points = np.array([[0.0, 0], [4, 0], [0, 4], [4, 4]])
+    mesh = triangulate(points)
+    face, weights = locate(points, mesh, np.concatenate([points, [[9.0, 9.0], [-1.0, 2.0], [np.nan, 0.0]]]))
+    assert (face[:4] >= 0).all()
+    np.testing.assert_allclose(weights[:4].max(axis=1), 1.0)
+    np.testing.assert_array_equal(face[4:], -1)
+
+
+def test_either_winding_can_be_located_in() -> None:
+    points = np.array([[0.0, 0], [4, 0], [0, 4]])
+    for face in ([0, 1, 2], [0, 2, 1]):
+        found, weights = locate(points, mesh_from_faces(np.array([face])), np.array([[1.0, 1.0]]))
+        assert found.tolist() == [0]
+        np.testing.assert_allclose(weights[0] @ points[face], [1.0, 1.0])
+
+
+@given(SEEDS, st.integers(1, 12))
+def test_farthest_points_are_distinct_and_far_apart(rng: np.random.Generator, count: int) -> None:
+    points = rng.normal(size=(40, 3))
+    chosen = farthest_points(points, count)
+    assert len(set(chosen.tolist())) == count
+    apart = np.linalg.norm(points[chosen[:, None]] - points[chosen], axis=2)[np.triu_indices(count, 1)]
+    cover = np.linalg.norm(points[:, None] - points[chosen], axis=2).min(axis=1).max()
+    assert not apart.size or apart.min() >= cover - 1e-12  # what farthest-first promises
+
+
+def test_no_more_points_than_there_are() -> None:
+    assert sorted(farthest_points(np.eye(3), 10).tolist()) == [0, 1, 2]
+
+
+def test_mesh_of_faces_has_their_edges() -> None:
+    mesh = mesh_from_faces(np.array([[2, 1, 0]], np.int32))
+    assert isinstance(mesh, Mesh)
+    assert mesh.faces.dtype == np.int64
+    assert mesh.edges.tolist() == [[0, 1], [0, 2], [1, 2]]

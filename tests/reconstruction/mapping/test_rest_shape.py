@@ -1,0 +1,264 @@
+"""The rest shape from the first frames: found where the frames show it, refused with reasons where they do not."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from reconstruction import ReconstructionError
+from reconstruction.camera import Camera
+from reconstruction.mapping import rest_shape
+from reconstruction.mapping.factorization import view_turn_degrees
+from reconstruction.mapping.rest_shape import apparent_change, first_image, foreshortening_degrees, judging_points, weigh
+from reconstruction.mapping.sheet import sheet
+from tests.reconstruction.world import (
+    CAMERAS,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    SEEDS,
+    flat,
+    relief,
+    rolled,
+    seen,
+    shape_error,
+    turn,
+    turns,
+)
+
+FRAMES, POINTS = 15, 60
+
+
+def views(shape: np.ndarray, R: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    W, _ = seen(np.broadcast_to(shape, (len(R), *shape.shape)), R, camera)
+    return W, np.ones((len(R), shape.shape[1]), bool)
+
+
+@settings(max_examples=8)
+@given(rng=SEEDS, camera=CAMERAS)
+def test_rigid_shape_of_a_turning_object(rng: np.random.Generator, camera: Camera) -> None:
+    shape = relief(rng, POINTS)
+    W, visible = views(shape, turns(FRAMES), camera)
+    evidence = weigh(W, visible)
+    assert evidence.doubt == "" or camera.perspective  # perspective is noise to the affine check
+    found = rest_shape.rigid(W, visible, camera)
+    assert found.kind == "rigid"
+    assert not found.flat
+    assert shape_error(found.motion.shape, turns(FRAMES)[0] @ shape) < 0.03
+    assert "turned" in found.note
+    assert "15 frames" in found.note
+
+
+@settings(max_examples=5)
+@given(rng=SEEDS)
+def test_perspective_tells_a_shape_from_its_mirror_image(rng: np.random.Generator) -> None:
+    shape = relief(rng, POINTS)
+    W, visible = views(shape, turns(FRAMES), PERSPECTIVE)
+    found = rest_shape.rigid(W, visible, PERSPECTIVE).motion
+    first = turns(FRAMES)[0] @ shape
+    depth = (found.R[0] @ found.shape)[2]
+    assert np.corrcoef(depth, first[2])[0, 1] > 0.9
+
+
+@settings(max_examples=8)
+@given(rng=SEEDS)
+def test_points_often_lost_do_not_spoil_the_shape(rng: np.random.Generator) -> None:
+    shape = relief(rng, POINTS)
+    W, visible = views(shape, turns(FRAMES), PERSPECTIVE)
+    visible = rng.random(visible.shape) < 0.7
+    visible[2:, 5] = False
+    found = rest_shape.rigid(np.where(visible[:, None], W, np.nan), visible, PERSPECTIVE).motion.shape
+    assert found.shape == shape.shape
+    assert np.isfinite(found).all()
+    kept = np.arange(POINTS) != 5
+    assert shape_error(found[:, kept], shape[:, kept]) < 0.06
+
+
+@pytest.mark.parametrize("seed", [0, 6])
+def test_points_seen_in_a_few_frames_much_alike_do_not_spoil_the_shape(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    shape = relief(rng, POINTS)
+    W, visible = views(shape, turns(FRAMES), ORTHOGRAPHIC)
+    W += rng.normal(0, 1.0, W.shape)
+    visible &= rng.random(visible.shape) > 0.5
+    few = rng.permutation(POINTS)[:15]
+    visible[:, few] = False
+    visible[4:7, few] = True  # hardly turned meanwhile
+    found = rest_shape.rigid(W, visible, ORTHOGRAPHIC).motion
+    sure = np.setdiff1d(np.arange(POINTS), few)
+    assert shape_error(found.shape[:, sure], (turns(FRAMES)[0] @ shape)[:, sure]) < 0.05
+
+
+def test_a_still_object_has_no_shape_and_the_error_says_how_much_it_turned() -> None:
+    rng = np.random.default_rng(0)
+    W, visible = views(relief(rng, POINTS), np.broadcast_to(np.eye(3), (FRAMES, 3, 3)), PERSPECTIVE)
+    with pytest.raises(
+        ReconstructionError, match=r"turned \d+\.\d° in 15 frames, about 10° are needed; .*--rest-shape plane"
+    ):
+        rest_shape.rigid(W + rng.normal(0, 0.05, W.shape), visible, PERSPECTIVE)
+
+
+@pytest.mark.parametrize(("degrees", "trusted"), [(0.0, False), (2.0, False), (25.0, True)])
+def test_evidence_for_a_rigid_shape_grows_with_the_turn(degrees: float, trusted: bool) -> None:
+    rng = np.random.default_rng(1)
+    W, visible = views(relief(rng, POINTS), turns(FRAMES, degrees), ORTHOGRAPHIC)
+    evidence = weigh(W + rng.normal(0, 0.1, W.shape), visible)
+    assert (evidence.doubt == "") == trusted, evidence.doubt
+    if degrees == 0.0:
+        assert evidence.turn_degrees < 10
+        assert "turned" in evidence.doubt
+        assert "10° are needed" in evidence.doubt
+
+
+def test_a_flat_sheet_is_not_taken_for_a_solid() -> None:
+    rng = np.random.default_rng(2)
+    W, visible = views(flat(rng, POINTS), turns(FRAMES), ORTHOGRAPHIC)
+    assert weigh(W + rng.normal(0, 0.2, W.shape), visible).doubt
+
+
+def test_a_deforming_sheet_is_not_taken_for_a_solid() -> None:
+    rng = np.random.default_rng(3)
+    sheet = flat(rng, POINTS)
+    shapes = np.stack([rolled(sheet, 0.012 * np.sin(f / 2)) for f in range(FRAMES)])
+    W, _ = seen(shapes, turns(FRAMES, 8.0), ORTHOGRAPHIC)
+    assert weigh(W, np.ones((FRAMES, POINTS), bool)).doubt
+
+
+@pytest.mark.parametrize("axis", [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0.7, 0.7, 0)])
+def test_tilt_of_a_turning_sheet_is_recovered_under_perspective(axis: tuple[float, float, float]) -> None:
+    rng = np.random.default_rng(4)
+    sheet, tilt = flat(rng, POINTS), turn((30 * axis[0], 30 * axis[1], 0))
+    R = turns(FRAMES) @ tilt
+    W, visible = views(sheet, R, PERSPECTIVE)
+    found = rest_shape.plane(W + rng.normal(0, 0.1, W.shape), visible, PERSPECTIVE)
+    assert found.flat
+    assert found.kind == "plane"
+    assert "tilted" in found.note
+    shape = found.motion.R[0] @ found.motion.shape
+    normal = np.linalg.svd(shape)[0][:, 2]
+    off = np.rad2deg(np.arccos(min(1.0, abs(normal @ R[0][:, 2]))))
+    assert off < 3
+    assert shape_error(shape, R[0] @ sheet) < 0.02
+    depths = np.linalg.svd(shape, compute_uv=False)
+    assert depths[2] < 1e-9 * depths[0]
+
+
+def test_the_tilt_of_a_sheet_seen_obliquely_shows_in_a_small_turn() -> None:
+    rng = np.random.default_rng(4)
+    sheet = flat(rng, POINTS)
+    R = turns(2 * FRAMES, 4.5) @ turn((0, 50, 0))
+    W, visible = views(sheet, R, PERSPECTIVE)
+    found = rest_shape.plane(W + rng.normal(0, 0.03, W.shape), visible, PERSPECTIVE)
+    assert "tilted" in found.note, found.note
+    assert view_turn_degrees(R) < 10
+    assert shape_error(found.motion.R[0] @ found.motion.shape, R[0] @ sheet) < 0.05
+
+
+@settings(max_examples=8)
+@given(rng=SEEDS, camera=CAMERAS)
+def test_a_still_sheet_faces_the_camera(rng: np.random.Generator, camera: Camera) -> None:
+    W, visible = views(flat(rng, POINTS), np.broadcast_to(np.eye(3), (FRAMES, 3, 3)), camera)
+    found = rest_shape.plane(W + rng.normal(0, 0.05, W.shape), visible, camera)
+    assert "facing the camera" in found.note
+    np.testing.assert_allclose(found.motion.shape[2], 0.0, atol=1e-9)
+    centred = W[0] - W[0].mean(axis=1, keepdims=True)
+    np.testing.assert_allclose(found.motion.shape[:2], centred, atol=0.5)
+
+
+def test_a_sheet_seen_by_three_points_is_refused() -> None:
+    W, visible = views(flat(np.random.default_rng(0), POINTS), turns(FRAMES), PERSPECTIVE)
+    visible[4, 3:] = False
+    with pytest.raises(ReconstructionError, match="fewer than 4 points are visible"):
+        rest_shape.plane(W, visible, PERSPECTIVE)
+
+
+@settings(max_examples=10)
+@given(rng=SEEDS, camera=CAMERAS)
+def test_a_sheet_in_a_given_plane_looks_like_the_image(rng: np.random.Generator, camera: Camera) -> None:
+    W, _ = views(flat(rng, POINTS), turns(1), camera)
+    motion = sheet(W[0], turn((20, -15, 0)), camera)
+    np.testing.assert_array_equal(motion.shape[2], 0.0)
+    placed = motion.s[0] * motion.R[0] @ motion.shape
+    image = (placed[:2] + motion.t[0][:, None]) / (1 + placed[2] / camera.focal_px) + camera.center_px[:, None]
+    difference = image - W[0]
+    assert np.abs(difference - difference.mean(axis=1, keepdims=True)).max() < 1.0  # the centroid moves under perspective
+
+
+@given(SEEDS, st.sampled_from([flat, relief]))
+def test_given_shapes_are_centred_and_known_to_be_flat_or_not(rng: np.random.Generator, surface) -> None:  # type: ignore[no-untyped-def]
+    shape = turn((20, 30, 10)) @ surface(rng, POINTS)
+    found = rest_shape.given(shape + 100.0, "mesh", "a note")
+    np.testing.assert_allclose(found.motion.shape, shape, atol=1e-9)
+    assert found.flat == (surface is flat)
+    assert (found.kind, found.note) == ("mesh", "a note")
+
+
+@settings(max_examples=10)
+@given(rng=SEEDS)
+def test_points_hidden_in_the_first_frame_are_put_where_the_others_say(rng: np.random.Generator) -> None:
+    W, visible = views(relief(rng, POINTS), turns(FRAMES), ORTHOGRAPHIC)
+    hidden = rng.random(POINTS) < 0.2
+    visible[0, hidden] = False
+    found = first_image(np.where(visible[:, None], W, np.nan), visible)
+    np.testing.assert_array_equal(found[:, ~hidden], W[0][:, ~hidden])
+    np.testing.assert_allclose(found[:, hidden], W[0][:, hidden], atol=0.5)
+
+
+def test_a_point_never_seen_gets_a_place_too() -> None:
+    W, visible = views(relief(np.random.default_rng(0), POINTS), turns(FRAMES), ORTHOGRAPHIC)
+    visible[:, 3] = False
+    visible[1:, 4] = False
+    visible[0, 4] = False
+    visible[6, 4] = True
+    found = first_image(np.where(visible[:, None], W, np.nan), visible)
+    assert np.isfinite(found).all()
+    np.testing.assert_array_equal(found[:, 4], W[6, :, 4])
+
+
+@given(SEEDS)
+def test_similarities_are_no_apparent_change(rng: np.random.Generator) -> None:
+    shape = relief(rng, POINTS)
+    W = np.stack([(1 + 0.1 * f) * (turn((0, 0, 10 * f)) @ shape)[:2] + 3 * f for f in range(5)])
+    visible = np.ones((5, POINTS), bool)
+    assert apparent_change(W, visible) < 1e-3
+    assert foreshortening_degrees(W, visible) < 0.5
+    bent = W.copy()
+    bent[3] += 4 * rng.normal(size=bent[3].shape)
+    assert apparent_change(bent, visible) > 2
+
+
+def test_foreshortening_of_a_sheet_is_its_turn() -> None:
+    W, visible = views(flat(np.random.default_rng(0), POINTS), np.stack([np.eye(3), turn((0, 40, 0))]), ORTHOGRAPHIC)
+    assert foreshortening_degrees(W, visible) == pytest.approx(40, abs=0.5)
+
+
+def test_judging_points_are_well_spread_and_often_seen() -> None:
+    rng = np.random.default_rng(0)
+    W = rng.uniform(0, 500, (10, 2, 600))
+    visible = np.ones((10, 600), bool)
+    visible[3:, 300:] = False
+    chosen = judging_points(W, visible)
+    assert len(set(chosen.tolist())) == len(chosen)
+    assert chosen.max() < 300
+
+
+def test_a_sheet_that_bends_later_is_judged_by_its_flat_frames() -> None:
+    rng = np.random.default_rng(4)
+    sheet, tilt, frames = flat(rng, POINTS), turn((20, 0, 0)), 40
+    curvature = np.concatenate([np.zeros(frames // 2), 0.012 * np.sin(np.arange(frames // 2) / 4)])
+    R = np.concatenate([turns(frames // 2), turns(frames // 2)]) @ tilt
+    W, _ = seen(np.stack([rolled(sheet, c) for c in curvature]), R, PERSPECTIVE)
+    W = W + rng.normal(0, 0.1, W.shape)
+    found = rest_shape.plane(W, np.ones((frames, POINTS), bool), PERSPECTIVE)
+    assert "tilted" in found.note
+    assert shape_error(found.motion.R[0] @ found.motion.shape, R[0] @ sheet) < 0.02
+
+
+def test_a_point_seen_once_is_put_among_what_is_seen_beside_it() -> None:
+    rng = np.random.default_rng(6)
+    shape = relief(rng, POINTS)
+    W, visible = views(shape, turns(FRAMES, 60.0), ORTHOGRAPHIC)
+    visible[:, 7] = False
+    visible[9, 7] = True  # where the object is turned by 60° against the first frame
+    found = rest_shape.rigid(np.where(visible[:, None], W, np.nan), visible, ORTHOGRAPHIC).motion.shape
+    found = min((m @ found for m in (np.eye(3), np.diag([1.0, 1.0, -1.0]))), key=lambda S: float(np.abs(S - shape).sum()))
+    assert np.linalg.norm(found[:, 7] - shape[:, 7]) < 0.4 * np.sqrt((shape**2).sum() / POINTS)
