@@ -114,7 +114,7 @@ def test_a_process_that_was_killed_is_told(tmp_path: Path, run: Run) -> None:
 ORPHAN = """
 import sys
 from pathlib import Path
-import tests.app.test_recorder as t
+import tests.app.recording.test_recorder as t
 from tests.synthetic_run import SIZE, write_run
 run = write_run(Path(sys.argv[1]) / "here.rrd", frames=40, first_shape=0)
 t.tell(t.Recorder(Path(sys.argv[1]) / "run.rrd", configuration={}, size=SIZE), run)
