@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-import app  # noqa: F401  # sets what Rerun reads when it is loaded
+from app.recording.environment import environment
+
+os.environ.update(environment())
 
 # A busy machine is no reason to fail, and a red run must be red again when it is repeated.
 settings.register_profile("modeshape", deadline=None, derandomize=True, max_examples=40, database=None)

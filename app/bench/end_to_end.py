@@ -19,7 +19,7 @@ KINECT = ROOT.parent / "shared" / "data" / "kinect_paper.mp4"  # research data, 
 KINECT_ROI = (195, 95, 325, 265)
 POINTS = (800, 3_000)
 MANY_POINTS, MANY_FRAMES = 28_887, 12
-HELP = (sys.executable, "-c", "from app.commands.cli import main; main()", "--help")
+HELP = (sys.executable, "-m", "modeshape", "--help")
 HELP_REPEATS = 5
 QUICK_FRAMES = 120
 
@@ -136,7 +136,7 @@ def child(module: str, *arguments: str) -> dict[str, float]:
     """What a module of ours, run by itself, prints as JSON."""
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
     done = subprocess.run(
-        [sys.executable, "-m", module, *arguments], env=environment, stdout=subprocess.PIPE, check=True, text=True
+        [sys.executable, "-P", "-m", module, *arguments], env=environment, stdout=subprocess.PIPE, check=True, text=True
     )
     words: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
     return words

@@ -11,7 +11,6 @@ from pathlib import Path
 Words = dict[str, object]
 
 UNFINISHED = "unfinished"
-PROGRAM = "from app.commands.cli import main; main()"
 BAD_INPUT, INTERRUPTED = 2, 130
 
 
@@ -67,7 +66,7 @@ def carry_out(job: Job, started: Callable[["subprocess.Popen[str]"], None] = lam
     if job.cores:
         environment["OPENCV_FOR_THREADS_NUM"] = str(job.cores)
     process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, *arguments],
+        [sys.executable, "-P", "-m", "modeshape", *arguments],
         env=environment,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,

@@ -16,6 +16,7 @@ from app.options.export import Export, Modes
 from app.options.reproduce import Reproduce
 from app.options.retexture import Retexture
 from app.options.run import Demo, Evaluate, Review, Run
+from app.recording.environment import environment
 from app.terminal.errors import UsageError
 
 Command = (
@@ -41,7 +42,7 @@ INTERRUPTED = 130
 
 def main() -> NoReturn:
     """Entry point of the `modeshape` script; exit code 2 means that something asked for cannot be done."""
-    os.environ.setdefault("RERUN_ANALYTICS", "0")
+    os.environ.update(environment())
     try:
         sys.exit(run(parse()))
     except ValueError as error:

@@ -15,6 +15,7 @@ from typing import IO, Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from app.recording.environment import environment
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.modes import Metric, ModalBasis
@@ -61,13 +62,8 @@ class Recorder:
         self._process: subprocess.Popen[bytes] | None = None
         if path or connect or view:
             self._process = subprocess.Popen(
-                [
-                    sys.executable,
-                    "-P",
-                    "-m",
-                    "app.recording.recorder",
-                ],  # -P: nothing from the user's folder
-                env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+                [sys.executable, "-P", "-m", "app.recording.recorder"],  # -P: nothing from the user's folder
+                env=environment() | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 start_new_session=True,  # Ctrl-C ends the run, which then tells what is left to write

@@ -1,6 +1,5 @@
 """The channel a recording is written through: Rerun's stream to a file, to viewers, to both or to nothing."""
 
-import os
 import shutil
 import subprocess
 from collections.abc import Iterable
@@ -12,6 +11,7 @@ import rerun_cli  # type: ignore[import-untyped]
 
 from app.recording import entities
 from app.recording.blueprint import blueprint
+from app.recording.environment import environment
 from app.terminal.errors import UsageError
 
 FLUSH_SECONDS = 10.0  # a viewer that hangs must not stop a run
@@ -131,7 +131,7 @@ def index(path: Path) -> None:
             return
         done = subprocess.run(
             [program, "rrd", "optimize", "--max-rows", "1", "--max-size", "1B", path, "-o", part],
-            env=os.environ | {"RUST_LOG": "off"},
+            env=environment(),
             stdin=subprocess.DEVNULL,
             capture_output=True,
             check=False,

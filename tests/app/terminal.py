@@ -17,9 +17,9 @@ from app.commands.cli import main
 from tests.tracking.scene import SIZE, texture
 
 Image = NDArray[np.uint8]
-PROGRAM = (sys.executable, "-c", "from app.commands.cli import main; main()")
+PROGRAM = (sys.executable, "-m", "modeshape")
 ROOT = Path(__file__).parents[2]
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT), "RERUN_ANALYTICS": "0"}
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,6 @@ def in_process(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatc
 
     def modeshape(*arguments: object) -> Outcome:
         monkeypatch.setattr(sys, "argv", ["modeshape", *map(str, arguments)])
-        monkeypatch.setenv("RERUN_ANALYTICS", "0")
         handler = signal.getsignal(signal.SIGTERM)
         capfd.readouterr()
         with pytest.raises(SystemExit) as stop:

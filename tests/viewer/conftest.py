@@ -53,7 +53,6 @@ def headless_viewer(folder: Path, size: tuple[int, int] = (1600, 1000)) -> Itera
             [program, *options, "--port", str(port)],
             stdout=output,
             stderr=subprocess.STDOUT,
-            env={**os.environ, "RERUN_ANALYTICS": "0"},
         )
     try:
         client = connected(process, port)

@@ -1,5 +1,4 @@
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -10,9 +9,6 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-
-os.environ["RERUN_ANALYTICS"] = "0"
-
 import rerun as rr
 from rerun.chunk import RrdReader
 

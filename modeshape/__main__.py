@@ -1,0 +1,34 @@
+"""The command: `modeshape`, or `python -m modeshape`."""
+
+import os
+import sys
+from pathlib import Path
+from typing import NoReturn
+
+
+def main() -> NoReturn:
+    """Carry out what the command line asks for."""
+    isolate()
+    from app.commands.cli import main as run
+
+    run()
+
+
+def isolate() -> None:
+    """Import nothing from the current folder, here or in child processes: it may hold an `app/` or a `numpy.py`.
+
+    Its place in `sys.path` and PYTHONPATH is dropped, unless the program itself lies there.
+    """
+    here, home = Path.cwd(), Path(__file__).parents[1]
+
+    def elsewhere(paths: list[str]) -> list[str]:
+        return [path for path in paths if here == home or Path(path).resolve() != here]
+
+    os.environ["PYTHONSAFEPATH"] = "1"
+    sys.path[:] = elsewhere(sys.path)
+    if "PYTHONPATH" in os.environ:
+        os.environ["PYTHONPATH"] = os.pathsep.join(elsewhere(os.environ["PYTHONPATH"].split(os.pathsep)))
+
+
+if __name__ == "__main__":
+    main()
