@@ -6,7 +6,7 @@ BIN := .venv/bin
 OPENCV4 := 4.14.0.94
 BIN4 := .venv-opencv4/bin
 
-.PHONY: demo bench test test-slow test-opencv4 lint types pictures clean
+.PHONY: demo bench test test-slow test-opencv4 lint types wheel pictures clean
 
 demo: .venv/ready
 	$(BIN)/modeshape demo
@@ -36,6 +36,14 @@ lint: .venv/ready
 types: .venv/ready
 	$(BIN)/mypy
 
+# What people install, tried in an empty environment and an empty folder.
+wheel: .venv/ready
+	rm -rf dist .venv-wheel
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
+	$(PYTHON) -m venv .venv-wheel
+	PIP_CONSTRAINT=constraints.txt .venv-wheel/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
+	cd "$$(mktemp -d)" && "$(CURDIR)/.venv-wheel/bin/modeshape" demo --json
+
 # Those of the README, in docs/.
 pictures: demo
 	$(BIN)/python -m docs.pictures
@@ -54,4 +62,4 @@ pictures: demo
 	touch $@
 
 clean:
-	rm -rf .venv .venv-opencv4 .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .venv-opencv4 .venv-wheel dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
