@@ -116,7 +116,7 @@ def run_apart(video: Path, roi: tuple[int, int, int, int], points: int, frames: 
     """`modeshape run` in a process that notes when each frame is done."""
     with TemporaryDirectory(prefix="modeshape-") as folder:
         where = ["--roi", *map(str, roi), "--points", str(points), "--frames", f":{frames or ''}"]
-        arguments = ["run", str(video), *where, "--out", str(Path(folder, "run.rrd"))]
+        arguments = [str(video), *where, "--out", str(Path(folder, "run.rrd"))]
         started = time()
         return child("app.bench.timed_run", *arguments) | {"started": started}
 

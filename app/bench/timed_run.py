@@ -4,14 +4,15 @@ import json
 import sys
 from time import time
 
-from app.commands.cli import parse
+import tyro
+
+from app.options.run import Run
 
 
 def main() -> None:
-    """Run what the command line says."""
-    command = parse()
+    """Run with the options on the command line, which are those of `modeshape run`."""
+    command = tyro.cli(Run)
     from app.bench.own_process import peak_mb
-    from app.options.run import Run
     from app.pipeline.session import Session
     from app.terminal.progress import Progress
 
@@ -25,7 +26,6 @@ def main() -> None:
             self.stamps.append(time())
             super().advance(phase, error_px)
 
-    assert isinstance(command, Run)
     clock = Clock()
     words = Session(command, clock).run()
     told = {"stamps": clock.stamps, "complete": time(), "peak_mb": peak_mb(), "points": words["points"]}

@@ -10,12 +10,13 @@ from threadpoolctl import threadpool_limits
 
 from app.bench import basis, end_to_end, window
 from app.bench.targets import Ratios, markdown, rows
-from app.options.bench import README_BEGIN, README_END, Bench
+from app.files.readme import put_table, with_table
+from app.files.writing import check_free, writable
+from app.options.bench import Bench
 from app.options.run import Words
-from app.pipeline.estimates import check_free, writable
-from app.reproduce.report import replaced_between
-from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
+
+README_TABLE = "bench"
 
 
 def bench(command: Bench, progress: Progress) -> Words:
@@ -25,7 +26,8 @@ def bench(command: Bench, progress: Progress) -> Words:
         UsageError: a file cannot be written, or the README has no place for the table.
     """
     check_free(command.plot, overwrite=command.overwrite)
-    with_table(command, "")
+    if command.readme:
+        with_table(command.readme, README_TABLE, "")
     quick, say = command.quick, progress.say
     with progress, threadpool_limits(1):  # as in a run
         races = list(window.races(quick=quick, say=say))
@@ -43,9 +45,8 @@ def bench(command: Bench, progress: Progress) -> Words:
 
         with writable(command.plot) as file:
             draw(file, command.plot.suffix[1:], timings, races, basis_times)
-    if command.readme and (text := with_table(command, markdown(ratios, in_words(machine())))):
-        with writable(command.readme) as file:
-            file.write(text.encode())
+    if command.readme:
+        put_table(command.readme, README_TABLE, markdown(ratios, in_words(machine())))
     return {
         "machine": machine(),
         "quick": quick,
@@ -57,21 +58,6 @@ def bench(command: Bench, progress: Progress) -> Words:
         "runs": [asdict(run) for run in runs],
         "ceres": races[0].ceres_ms is not None,
     }
-
-
-def with_table(command: Bench, table: str) -> str | None:
-    """The README with the table in it; None without one."""
-    if command.readme is None:
-        return None
-    try:
-        text = replaced_between(command.readme.read_text(), README_BEGIN, README_END, table)
-    except OSError as error:
-        raise UsageError(f"cannot read --readme {command.readme}: {error.strerror}") from None
-    if text is None:
-        raise UsageError(
-            f"--readme {command.readme} has no place for the table: put in the lines {README_BEGIN} and {README_END}"
-        )
-    return text
 
 
 def machine() -> dict[str, str | int | None]:

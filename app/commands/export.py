@@ -11,9 +11,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.files.writing import check_free, writable
 from app.options.export import Export
 from app.options.run import Words
-from app.pipeline.estimates import check_free, writable
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress

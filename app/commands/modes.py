@@ -5,18 +5,16 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from app.files.writing import check_free, writable
 from app.options.export import Modes
 from app.options.run import Evaluate, Words
-from app.pipeline.estimates import check_free, writable
+from app.recording.modes_figure import modes_figure, spectrum, title_of
 from app.terminal.progress import Progress
-from reconstruction.basis.distances import Metric, MetricChoice, dissimilarity, fitting
+from reconstruction.basis.distances import Metric, MetricChoice, fitting
 from reconstruction.basis.mesh import Mesh
-from reconstruction.basis.modes import ModalBasis, doubly_centred, exact_points, is_flat
-
-Array = NDArray[np.float64]
+from reconstruction.basis.modes import ModalBasis, is_flat
 
 
 def modes(command: Modes, progress: Progress) -> Words:
@@ -33,7 +31,7 @@ def modes(command: Modes, progress: Progress) -> Words:
         recorded = not zipfile.is_zipfile(command.source)  # an .npz is one
         name, basis, mesh, metric = (of_recording if recorded else of_tracks)(command, progress)
         eigenvalues = spectrum(basis, mesh, metric)
-        png = draw(basis, mesh, eigenvalues, title(name, basis, metric), columns=command.columns)
+        png = modes_figure(basis, mesh, eigenvalues, title=title_of(name, basis, metric), columns=command.columns)
     with writable(command.out) as file:
         file.write(png)
     return {
@@ -77,25 +75,3 @@ def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh
     progress.say(reconstruction.rest.note)
     assert reconstruction.metric is not None
     return Path(command.source).stem, reconstruction.model.basis, reconstruction.model.mesh, reconstruction.metric
-
-
-def spectrum(basis: ModalBasis, mesh: Mesh, metric: Metric) -> Array:
-    """All eigenvalues (p,) of −½CDC, descending; of many points those of the basis, since D would not fit in memory."""
-    if basis.rest.shape[1] > exact_points(metric):
-        return basis.eigenvalues
-    D = dissimilarity(metric, basis.rest, mesh.edges)
-    return np.asarray(np.linalg.eigvalsh(doubly_centred(D))[::-1], np.float64)
-
-
-def title(name: str, basis: ModalBasis, metric: str) -> str:
-    """The figure's headline."""
-    return f"Mode shapes of {name}: {basis.rest.shape[1]} points, {metric} distances"
-
-
-def draw(
-    basis: ModalBasis, mesh: Mesh, eigenvalues: Array, headline: str, *, columns: int = 5, jpeg: bool = False
-) -> bytes:
-    """The figure as a PNG or, smaller, as a JPEG."""
-    from app.recording.modes_figure import modes_figure
-
-    return modes_figure(basis, mesh, eigenvalues, title=headline, columns=columns, jpeg=jpeg)

@@ -6,14 +6,16 @@ from time import perf_counter
 
 from threadpoolctl import threadpool_limits
 
-from app.options.reproduce import README_BEGIN, README_END, Reproduce
+from app.files.readme import put_table, with_table
+from app.options.reproduce import Reproduce
 from app.options.run import Words
-from app.pipeline.estimates import writable
 from app.reproduce.catalog import CATALOG
 from app.reproduce.experiment import Experiment
-from app.reproduce.report import Report, replaced_between
+from app.reproduce.report import Report
 from app.reproduce.work import Effort, Work
 from app.terminal.errors import UsageError
+
+README_TABLE = "reproduce"
 
 
 def reproduce(command: Reproduce) -> Words:
@@ -27,7 +29,7 @@ def reproduce(command: Reproduce) -> Words:
     """
     effort = Effort(command.quick)
     if command.readme:
-        with_table(command.readme, "")
+        with_table(command.readme, README_TABLE, "")
     report = Report(command.out, [experiment.name for experiment in CATALOG])
     chosen = [experiment for experiment in CATALOG if not command.only or experiment.name in command.only]
     skipped = {e.name: absent for e in chosen if (absent := [f for f in e.files if not (command.data / f).is_file()])}
@@ -49,9 +51,7 @@ def reproduce(command: Reproduce) -> Words:
         except KeyboardInterrupt:
             interrupted = True
     if command.readme and not interrupted:
-        text = with_table(command.readme, report.headlines())
-        with writable(command.readme) as file:
-            file.write(text.encode())
+        put_table(command.readme, README_TABLE, report.headlines())
     return report.as_words() | {"skipped": skipped, "interrupted": interrupted, "report": str(report.markdown_path)}
 
 
@@ -68,21 +68,6 @@ def run_one(experiment: Experiment, work: Work, report: Report) -> None:
 def needed(experiments: list[Experiment]) -> list[str]:
     """Their files, each once."""
     return list(dict.fromkeys(file for experiment in experiments for file in experiment.files))
-
-
-def with_table(readme: Path, table: str) -> str:
-    """The README with the table between its markers.
-
-    Raises:
-        UsageError: it is not there, or has no markers.
-    """
-    try:
-        text = replaced_between(readme.read_text(), README_BEGIN, README_END, table)
-    except OSError as error:
-        raise UsageError(f"cannot read --readme {readme}: {error.strerror}") from None
-    if text is None:
-        raise UsageError(f"--readme {readme} has no place for the table: put in the lines {README_BEGIN} and {README_END}")
-    return text
 
 
 def summary(words: Words) -> Words:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from app.commands.export import steady
 from app.files.video_out import PacedVideo, VideoSink, check_video_format
+from app.files.writing import check_free
 from app.options.retexture import Retexture
 from app.options.run import Words, parse_range
 from app.painting.compositing import Compositor, Laid
 from app.painting.picture import Artwork
-from app.pipeline.estimates import check_free
 from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError

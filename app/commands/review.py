@@ -9,8 +9,8 @@ from typing import cast
 from rich.console import Console
 from rich.table import Table
 
+from app.files.writing import check_free, writable
 from app.options.run import Review, Words
-from app.pipeline.estimates import check_free, writable
 from app.playback.measures import Reviewed, as_words, per_frame, reviewed
 from app.playback.playback import Playback
 from app.terminal.progress import Progress

@@ -5,8 +5,6 @@ from pathlib import Path
 
 from app.terminal.errors import UsageError
 
-README_BEGIN, README_END = "<!-- bench: begin -->", "<!-- bench: end -->"
-
 
 @dataclass(frozen=True)
 class Bench:

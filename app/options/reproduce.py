@@ -22,7 +22,6 @@ Name = Literal[
     "talking-face",
 ]
 NAMES: tuple[str, ...] = get_args(Name)
-README_BEGIN, README_END = "<!-- reproduce: begin -->", "<!-- reproduce: end -->"
 
 
 @dataclass(frozen=True)

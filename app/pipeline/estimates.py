@@ -1,15 +1,13 @@
 """What a run or an evaluation collects and puts out: shapes, scores, files."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.terminal.errors import UsageError
+from app.files.writing import writable
 from reconstruction.basis.mesh import Mesh
 from reconstruction.evaluation import Score, followed, score
 from reconstruction.window.model import Model, ShapeEstimate
@@ -143,41 +141,3 @@ def without_shape(like: ShapeEstimate) -> ShapeEstimate:
         residual_px=nan(like.residual_px),
         visible=np.zeros_like(like.visible),
     )
-
-
-def check_free(path: Path | None, *, overwrite: bool) -> None:
-    """See to it, before anything is computed, that a file can be written.
-
-    Raises:
-        UsageError: it exists and may not be replaced, or its folder cannot be made.
-    """
-    if path is None:
-        return
-    if path.exists() and not overwrite:
-        raise UsageError(f"{path} exists: replace it with --overwrite, or choose another name")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("ab"):
-            pass
-        if path.stat().st_size == 0:
-            path.unlink()
-    except OSError as error:
-        raise UsageError(f"cannot write {path}: {error.strerror}; choose another place") from error
-
-
-@contextmanager
-def writable(path: Path) -> Iterator[BinaryIO]:
-    """A binary file that appears under its name only when complete.
-
-    Raises:
-        UsageError: the file cannot be written.
-    """
-    part = path.with_name(path.name + ".part")
-    try:
-        with part.open("wb") as file:
-            yield file
-        part.replace(path)
-    except OSError as error:
-        raise UsageError(f"cannot write {path}: {error.strerror}; free some space or choose another place") from error
-    finally:
-        part.unlink(missing_ok=True)

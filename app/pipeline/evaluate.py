@@ -8,8 +8,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from app.files.mesh_file import rest_of_vertices
+from app.files.writing import check_free
 from app.options.run import Evaluate, Words
-from app.pipeline.estimates import Collected, check_free, save_shapes, score_words
+from app.pipeline.estimates import Collected, save_shapes, score_words
 from app.pipeline.prepare import RECOVERED, settings_of
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress

@@ -8,12 +8,12 @@ from time import perf_counter
 
 from threadpoolctl import threadpool_limits
 
+from app.files.writing import check_free
 from app.options.run import Run, Words, as_words
 from app.painting.compositing import Laid, painted
 from app.painting.picture import first_picture
 from app.pipeline.behind import Behind
 from app.pipeline.counts import Tally
-from app.pipeline.estimates import check_free
 from app.pipeline.interrupts import completed
 from app.pipeline.observer import Followed, Observer
 from app.pipeline.parts import RECORDINGS, Parts, free_name

@@ -12,8 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
+from reconstruction.basis.distances import Metric, dissimilarity
 from reconstruction.basis.mesh import Mesh
-from reconstruction.basis.modes import ModalBasis
+from reconstruction.basis.modes import ModalBasis, doubly_centred, exact_points
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -56,10 +57,23 @@ class View:
         return np.column_stack([right, -down])
 
 
+def spectrum(basis: ModalBasis, mesh: Mesh, metric: Metric) -> Array:
+    """All eigenvalues (p,) of −½CDC, descending; of many points those of the basis, since D would not fit in memory."""
+    if basis.rest.shape[1] > exact_points(metric):
+        return basis.eigenvalues
+    D = dissimilarity(metric, basis.rest, mesh.edges)
+    return np.asarray(np.linalg.eigvalsh(doubly_centred(D))[::-1], np.float64)
+
+
+def title_of(name: str, basis: ModalBasis, metric: str) -> str:
+    """The figure's headline."""
+    return f"Mode shapes of {name}: {basis.rest.shape[1]} points, {metric} distances"
+
+
 def modes_figure(
-    basis: ModalBasis, mesh: Mesh, spectrum: Array, *, title: str, columns: int = COLUMNS, jpeg: bool = False
+    basis: ModalBasis, mesh: Mesh, eigenvalues: Array, *, title: str, columns: int = COLUMNS, jpeg: bool = False
 ) -> bytes:
-    """The leading modes under Γ_α, Γ_β, Γ_τ (rows) and the eigenvalues `spectrum` (n,), descending, n >= r.
+    """The leading modes under Γ_α, Γ_β, Γ_τ (rows) and all `eigenvalues` (n,), descending, n >= r.
 
     Returns:
         a PNG, or a smaller picture as a JPEG.
@@ -93,7 +107,7 @@ def modes_figure(
     draw_spectrum(
         figure.add_axes(place(right + 0.75, BOTTOM + 0.35, SPECTRUM - 1.0, 3 * panel[1] - 0.45)),
         basis.eigenvalues,
-        spectrum,
+        eigenvalues,
     )
     figure.text(0.18 / width, 1 - 0.3 / height, title, fontsize=13, color=INK, va="center")
     key = "color: the mode's value at a point, from negative (blue) to positive (red); gray: rest shape"
@@ -163,9 +177,9 @@ def boundary(faces: Indices) -> Indices:
     return np.asarray(edges[count == 1], np.int64)
 
 
-def draw_spectrum(axes: Axes, used: Array, spectrum: Array) -> None:
+def draw_spectrum(axes: Axes, used: Array, eigenvalues: Array) -> None:
     """Eigenvalues of −½CDC on two logarithmic scales; those of the modes in use stand out."""
-    positive = spectrum[spectrum > 1e-9 * spectrum[0]]
+    positive = eigenvalues[eigenvalues > 1e-9 * eigenvalues[0]]
     axes.loglog(np.arange(1, len(positive) + 1), positive, color=GHOST, linewidth=1.6)
     axes.loglog(np.arange(1, len(used) + 1), used, "o", color="#c8502d", markersize=3.5)
     axes.set_title(f"eigenvalues ({len(used)} modes in use)", fontsize=11, color=INK, pad=8)

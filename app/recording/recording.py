@@ -204,10 +204,10 @@ class Recording:
         """The figure of the mode shapes, which takes about a second to draw."""
         if not self._stream.open:
             return
-        from app.commands.modes import draw, spectrum, title
+        from app.recording.modes_figure import modes_figure, spectrum, title_of  # matplotlib takes its time to load
 
         name = self.path.stem if self.path else "the run"
-        figure = draw(basis, mesh, spectrum(basis, mesh, metric), title(name, basis, metric), jpeg=True)
+        figure = modes_figure(basis, mesh, spectrum(basis, mesh, metric), title=title_of(name, basis, metric), jpeg=True)
         self._stream.log(entities.MODES, rr.EncodedImage(contents=figure, media_type="image/jpeg"), static=True)
 
     def summary(self, values: Mapping[str, object]) -> None:

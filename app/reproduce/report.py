@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import scipy  # type: ignore[import-untyped, unused-ignore]
 
-from app.pipeline.estimates import writable
+from app.files.writing import writable
 from app.reproduce.experiment import Experiment
 from app.reproduce.result import Result, markdown_table
 from app.terminal.errors import UsageError
@@ -137,10 +137,3 @@ def processor(read: Callable[[], str] = lambda: Path("/proc/cpuinfo").read_text(
     except OSError:
         names = []
     return names[0] if names else platform.machine()
-
-
-def replaced_between(text: str, begin: str, end: str, table: str) -> str | None:
-    """The text with what lies between two markers replaced; None if they are not there in this order."""
-    head, found, rest = text.partition(begin)
-    _, closed, tail = rest.partition(end)
-    return f"{head}{begin}\n{table}{end}{tail}" if found and closed else None

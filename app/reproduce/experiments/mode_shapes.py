@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from app.commands.modes import draw, spectrum, title
+from app.recording.modes_figure import modes_figure, spectrum, title_of
 from app.reproduce.chart import Panel, Series, charts
 from app.reproduce.experiment import Experiment
 from app.reproduce.experiments.basis_time import METRICS
@@ -30,8 +30,8 @@ def mode_shapes(work: Work) -> Result:
     pictures = {}
     for name, rest, mesh, file in surfaces:
         basis = modal_basis(rest, mesh, 20)
-        headline, values = title(name, basis, "euclidean"), spectrum(basis, mesh, "euclidean")
-        pictures[file] = draw(basis, mesh, values, headline, columns=DRAWN, jpeg=True)
+        title, values = title_of(name, basis, "euclidean"), spectrum(basis, mesh, "euclidean")
+        pictures[file] = modes_figure(basis, mesh, values, title=title, columns=DRAWN, jpeg=True)
         work.step()
     figures = {"modes-dome.jpg": pictures.pop("modes-dome.jpg"), "spectrum.png": spectra(flag, flag_mesh)}
     work.step()

@@ -11,14 +11,14 @@ import pytest
 from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
-from app.commands.modes import modes, spectrum
+from app.commands.modes import modes
 from app.options.export import Modes
 from app.options.model import Model
 from app.options.run import Output
 from app.options.run import Run as Asked
 from app.pipeline.session import Session
 from app.recording import entities
-from app.recording.modes_figure import AMPLITUDE, View, boundary, brightness, displaced, modes_figure
+from app.recording.modes_figure import AMPLITUDE, View, boundary, brightness, displaced, modes_figure, spectrum
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from reconstruction.basis.mesh import triangulate
