@@ -4,8 +4,8 @@
     render(frame)      one picture, with or without the hand
     true_shape(frame)  where the points of grid() are in it
 
-texture is the page (ink what it is drawn with), motion the sheet's shape, desk and hand what else is in view,
-camera takes the pictures, store keeps the files.
+page.png is printed on the sheet, motion is the sheet's shape, desk.png and hand are what else is in view, camera takes
+the pictures, store keeps the files.
 """
 
 from app.demo.camera import SIZE, K, occluder, project, render, sheet_at, true_shape

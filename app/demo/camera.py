@@ -6,20 +6,21 @@ nearest one where the curve hides itself. Pixel centres are at whole numbers, as
 """
 
 from functools import cache
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.demo.desk import desk
 from app.demo.hand import hand_layer
 from app.demo.motion import HEIGHT_MM, WIDTH_MM, Surface, grid, surface
-from app.demo.texture import printed_page
 
 Floats = NDArray[np.float32]
 
 SIZE = (640, 480)
 """Width and height of the video."""
+PAGE, DESK = (Path(__file__).with_name(name) for name in ("page.png", "desk.png"))
+"""What is printed on the sheet, from edge to edge; what is seen without a sheet. Drawn by docs/sample."""
 K = np.array([(600.0, 0.0, 320.0), (0.0, 600.0, 240.0), (0.0, 0.0, 1.0)])
 """Intrinsics: the focal length is not the width, so a program that assumes so is put to the test."""
 
@@ -161,15 +162,20 @@ def _lit_page(sheet: Surface) -> NDArray[np.uint8]:
 
 @cache
 def _page() -> NDArray[np.uint8]:
-    page = printed_page()
     size = round(WIDTH_MM * _PAGE_PX_PER_MM), round(HEIGHT_MM * _PAGE_PX_PER_MM)
-    small = cv2.resize(page, size, interpolation=cv2.INTER_AREA)
+    small = cv2.resize(_drawn(PAGE), size, interpolation=cv2.INTER_AREA)
     return np.dstack([small, np.full(small.shape[:2], 255, np.uint8)])
 
 
 @cache
 def _ground() -> Floats:
-    return desk(SIZE).astype(np.float32)
+    return _drawn(DESK).astype(np.float32)
+
+
+def _drawn(path: Path) -> NDArray[np.uint8]:
+    picture = cv2.imread(str(path))
+    assert picture is not None, path
+    return picture.astype(np.uint8)
 
 
 def _shadow(sheet: Surface) -> Floats:

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,9 +11,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from app.demo.camera import SIZE, K, occluder, project, render, shading, true_shape
+from app.demo.camera import PAGE, SIZE, K, occluder, project, render, shading, true_shape
 from app.demo.motion import FPS, FRAMES, HEIGHT_MM, WIDTH_MM, grid, surface
-from app.demo.texture import printed_page
 from app.terminal.errors import UsageError
 
 TRUTH_EVERY = 4
@@ -52,8 +52,8 @@ def sample(folder: Path | None = None, progress: Callable[[int, int], None] | No
             home.mkdir(parents=True, exist_ok=True)
             # Complete files are moved into place one by one: an interrupted run leaves none half written.
             with tempfile.TemporaryDirectory(dir=home, ignore_cleanup_errors=True) as unfinished:
-                for path, write in ((made.texture, _write_texture), (made.truth, _write_truth)):
-                    write(Path(unfinished) / path.name)
+                shutil.copyfile(PAGE, Path(unfinished) / made.texture.name)
+                _write_truth(Path(unfinished) / made.truth.name)
                 _write_video(Path(unfinished) / made.video.name, progress)
                 for path in (made.texture, made.truth, made.video):
                     (Path(unfinished) / path.name).replace(path)
@@ -71,9 +71,9 @@ def _cache() -> Path:
 
 
 def _version() -> str:
-    """A digest of everything the sample is made by: this package and the library that draws."""
+    """A digest of everything the sample is made by: code and pictures of this package, and the library that draws."""
     digest = hashlib.sha256(cv2.__version__.encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    for source in sorted(Path(__file__).parent.glob("*.p*")):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:12]
 
@@ -83,11 +83,6 @@ def _roi() -> tuple[int, int, int, int]:
     left, top = np.ceil(corners.min(axis=0)).astype(int) + _ROI_INSET_PX
     right, bottom = np.floor(corners.max(axis=0)).astype(int) - _ROI_INSET_PX
     return int(left), int(top), int(right - left), int(bottom - top)
-
-
-def _write_texture(path: Path) -> None:
-    if not cv2.imwrite(str(path), printed_page()):
-        raise OSError("OpenCV does not write PNG files there")
 
 
 def _write_truth(path: Path) -> None:

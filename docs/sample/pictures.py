@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.demo.ink import (
+from docs.sample.ink import (
     BLACK,
     INKS,
     OCHRE,

@@ -8,7 +8,8 @@ from functools import cache
 
 import numpy as np
 
-from app.demo.ink import (
+from app.demo.motion import HEIGHT_MM, WIDTH_MM
+from docs.sample.ink import (
     BLACK,
     GREEN,
     INKS,
@@ -29,8 +30,7 @@ from app.demo.ink import (
     polyline,
     write,
 )
-from app.demo.motion import HEIGHT_MM, WIDTH_MM
-from app.demo.pictures import city_plan, landscape
+from docs.sample.pictures import city_plan, landscape
 
 
 @cache
