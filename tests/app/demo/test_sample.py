@@ -1,6 +1,5 @@
 """The sample: what it shows is where the truth says, the sheet does not stretch, and it is made only once."""
 
-import time
 from pathlib import Path
 
 import cv2
@@ -20,11 +19,9 @@ BENT = (0, 33, 75, 130, 190, 217, 240, 262, 299)
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[demo.Sample, float]:
-    """The sample, and the seconds it took."""
-    begin = time.perf_counter()
-    sample = demo.sample(tmp_path_factory.mktemp("cache"))
-    return sample, time.perf_counter() - begin
+def made(tmp_path_factory: pytest.TempPathFactory) -> demo.Sample:
+    """The sample."""
+    return demo.sample(tmp_path_factory.mktemp("cache"))
 
 
 def edges() -> NDArray[np.int64]:
@@ -181,8 +178,8 @@ def test_every_patch_of_the_sheet_has_corners() -> None:
     assert per_cell.min() >= 8
 
 
-def test_video_has_all_frames_at_true_times_and_clean(made: tuple[demo.Sample, float]) -> None:
-    video = cv2.VideoCapture(str(made[0].video))
+def test_video_has_all_frames_at_true_times_and_clean(made: demo.Sample) -> None:
+    video = cv2.VideoCapture(str(made.video))
     for frame in range(demo.FRAMES):
         read, picture = video.read()
         assert read
@@ -192,8 +189,8 @@ def test_video_has_all_frames_at_true_times_and_clean(made: tuple[demo.Sample, f
     assert not video.read()[0]
 
 
-def test_truth_has_the_agreed_arrays(made: tuple[demo.Sample, float]) -> None:
-    with np.load(made[0].truth) as truth:
+def test_truth_has_the_agreed_arrays(made: demo.Sample) -> None:
+    with np.load(made.truth) as truth:
         frames, points = truth["gt_frames"], len(truth["uv"])
         assert frames.tolist() == list(range(0, demo.FRAMES, demo.TRUTH_EVERY))
         assert points >= 300
@@ -208,28 +205,24 @@ def test_truth_has_the_agreed_arrays(made: tuple[demo.Sample, float]) -> None:
         assert truth["shading"].shape == (len(frames), points)
         assert truth["shading"].min() > 0.2
         np.testing.assert_array_equal(truth["occluder"][54], demo.occluder(216))
-    texture = cv2.imread(str(made[0].texture))
+    texture = cv2.imread(str(made.texture))
     assert texture.shape[1] / texture.shape[0] == pytest.approx(WIDTH_MM / HEIGHT_MM)
 
 
-def test_region_lies_on_the_sheet(made: tuple[demo.Sample, float]) -> None:
-    x, y, w, h = made[0].roi
+def test_region_lies_on_the_sheet(made: demo.Sample) -> None:
+    x, y, w, h = made.roi
     corners = demo.project(demo.true_shape(0))
     assert (corners.min(axis=0) < (x, y)).all()
     assert (corners.max(axis=0) > (x + w, y + h)).all()
     assert w * h > 0.75 * np.prod(np.ptp(corners, axis=0))
 
 
-def test_made_in_time(made: tuple[demo.Sample, float]) -> None:
-    assert made[1] < 20
-
-
-def test_made_once(made: tuple[demo.Sample, float]) -> None:
+def test_made_once(made: demo.Sample) -> None:
     calls: list[tuple[int, int]] = []
-    again = demo.sample(made[0].video.parents[1], progress=lambda *done: calls.append(done))
-    assert again == made[0]
+    again = demo.sample(made.video.parents[1], progress=lambda *done: calls.append(done))
+    assert again == made
     assert calls == []
-    assert sorted(path.name for path in made[0].video.parent.iterdir()) == [
+    assert sorted(path.name for path in made.video.parent.iterdir()) == [
         "sheet.mp4",
         "sheet.png",
         "sheet_gt.npz",
