@@ -94,7 +94,7 @@ def followed(
     face, weights = locate(projections[0], mesh, truth_px)
     inside = face >= 0
     if inside.sum() < 3:
-        raise ReconstructionError("fewer than 3 truth points lie inside the mesh in the first truth frame: check --roi")
+        raise ReconstructionError("fewer than 3 truth points lie inside the mesh in the first truth frame", "region")
     corners, weights = mesh.faces[face[inside]], weights[inside]
 
     def at(S: Array) -> Array:

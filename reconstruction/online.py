@@ -1,23 +1,22 @@
 """The on-line estimator: one observation in, the shapes it settles out (paper §5)."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from enum import Enum
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError
-from reconstruction.basis.distances import Metric, MetricChoice, fitting
+from reconstruction.basis.distances import fitting
 from reconstruction.basis.mesh import Mesh
 from reconstruction.camera import Camera
 from reconstruction.mapping import focal, rest_shape
 from reconstruction.mapping.factorization import view_turn_degrees
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.rest_shape import TURN_DEGREES, RestShape
+from reconstruction.settings import Deformation, Metric, Settings
 from reconstruction.window import priors
-from reconstruction.window.constraints import Deformation, build_energy, build_guides, chosen
+from reconstruction.window.constraints import build_energy, build_guides, chosen
 from reconstruction.window.model import Model, ShapeEstimate, build_model
 from reconstruction.window.priors import Weights
 from reconstruction.window.window import SlidingWindow
@@ -34,35 +33,6 @@ class Phase(Enum):
     BOOTSTRAP = "bootstrap"
     TRACKING = "tracking"
     LOST = "lost"
-
-
-@dataclass(frozen=True)
-class Settings:
-    """How to reconstruct.
-
-    Attributes:
-        rest_shape: auto, rigid or plane; `given` overrides it.
-        bootstrap_frames: frames the rest shape comes from; None decides from the evidence.
-        modes: r.
-        metric: dissimilarity the modes come from; auto by whether the rest shape is flat.
-        deformation: constraint on Λ (§3.4).
-        window: frames 𝒲 adjusted together.
-        energy: anchored (tied to the past, pulled to rest) or the paper's §5 as printed.
-        priors: weights by name (see `priors`) instead of that energy's own.
-        refine_rest: whether later frames refine the rest shape; not with the paper's energy.
-        estimate_focal: whether the first frames may say the focal length of a perspective camera.
-    """
-
-    rest_shape: Literal["auto", "rigid", "plane"] = "auto"
-    bootstrap_frames: int | None = None
-    modes: int = 20
-    metric: MetricChoice = "auto"
-    deformation: Deformation = "auto"
-    window: int = 3
-    energy: Literal["anchored", "paper"] = "anchored"
-    priors: Mapping[str, float] = field(default_factory=dict)
-    refine_rest: bool = True
-    estimate_focal: bool = False
 
 
 class Reconstruction:
@@ -87,15 +57,14 @@ class Reconstruction:
         self, camera: Camera, settings: Settings, given: RestShape | None = None, mesh: Mesh | None = None
     ) -> None:
         if settings.energy == "paper" and camera.perspective:
-            raise ReconstructionError("--energy paper is orthographic: use it with --camera orthographic")
-        priors.check(settings.priors)
+            raise ReconstructionError("energy paper needs an orthographic camera", "energy")
         self.camera, self.settings = camera, settings
         self.rest = given
         self._mesh = mesh
         self.window: SlidingWindow | None = None
         self.bootstrap_frames = 0
         self.metric: Metric | None = None
-        self.deformation = settings.deformation
+        self.deformation: Deformation = settings.deformation
         self.focal_note = ""
         self._waiting: list[tuple[Array, Visibility]] = []
 
@@ -138,12 +107,13 @@ class Reconstruction:
         if self.window is not None:
             return [self.window.advance(W, visible)]
         if self.settings.modes >= W.shape[1]:
-            raise ReconstructionError(f"--modes {self.settings.modes} does not fit {W.shape[1]} points: choose fewer")
+            problem = f"modes {self.settings.modes} does not fit {W.shape[1]} points: choose fewer"
+            raise ReconstructionError(problem, "modes")
         self._waiting.append((W, visible))
         n, wanted = len(self._waiting), self.settings.bootstrap_frames
         if self.rest is not None:
             return self._start(self.rest)
-        if wanted is None:
+        if wanted == "auto":
             if n in BOOTSTRAP_SCHEDULE:
                 return self._decide(last=n == BOOTSTRAP_SCHEDULE[-1])
         elif n >= wanted:
@@ -165,7 +135,7 @@ class Reconstruction:
         kind = self.settings.rest_shape
         if kind == "plane":
             return self._recover("plane", W, visible)
-        if kind == "rigid" and self.settings.bootstrap_frames is not None:
+        if kind == "rigid" and self.settings.bootstrap_frames != "auto":
             return self._recover("rigid", W, visible)
         doubt = "there are too few frames for a rigid shape"
         if len(W) >= BOOTSTRAP_SCHEDULE[0]:
@@ -180,9 +150,7 @@ class Reconstruction:
         if not last:
             return []
         if kind == "rigid":
-            raise ReconstructionError(
-                f"cannot recover a rest shape: {doubt}; give one with --rest-shape plane or --rest-shape mesh.obj"
-            )
+            raise ReconstructionError(f"cannot recover a rest shape: {doubt}", "rest_shape")
         return self._recover("plane", W, visible, f" (no rigid shape: {doubt})")
 
     def _recover(

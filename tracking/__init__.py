@@ -2,4 +2,13 @@
 
 
 class TrackingError(ValueError):
-    """A video, region or track file that cannot be used; the message names it and the remedy."""
+    """A video, region or track file that cannot be used; the message says what is wrong and what is needed.
+
+    Args:
+        text: the message.
+        about: what it is about: truth, frames or drop_late; empty for anything else.
+    """
+
+    def __init__(self, text: str, about: str = "") -> None:
+        super().__init__(text)
+        self.about = about

@@ -53,7 +53,8 @@ def detect_corners(gray: Image, region: Image, max_points: int = 800) -> Array:
     if len(corners) < MIN_CORNERS:
         raise TrackingError(
             f"only {len(corners)} corners found in the region, at least {MIN_CORNERS} are needed; "
-            "choose a region with texture, or start at a frame that shows it (--frames)"
+            "choose a region with texture, or start at a frame that shows it",
+            "frames",
         )
     return corners[:max_points]
 

@@ -65,8 +65,10 @@ class Tracks:
         """
         arrays = _read_npz(path)
         if "W" not in arrays:
-            hint = "; with W_px it is a file of truth only, for --ground-truth" if "W_px" in arrays else ""
-            raise TrackingError(f"{path} has no array W (frames, 2, points), only {_names(arrays)}{hint}")
+            problem = f"{path} has no array W (frames, 2, points), only {_names(arrays)}"
+            if "W_px" in arrays:
+                raise TrackingError(f"{problem}; with W_px it is a file of truth only", "truth")
+            raise TrackingError(problem)
         try:
             W = _numbers("W", arrays)
             visible = _flags("visible", arrays)

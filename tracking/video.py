@@ -86,7 +86,7 @@ class Video:
         self.live = is_camera(source) or isinstance(self._capture, Reconnecting)
         if drop_late and not self.live:
             self._capture.release()
-            raise TrackingError(f"{source} is no camera or stream: frames of a file are never late; leave --drop-late out")
+            raise TrackingError(f"{source} is no camera or stream: frames of a file are never late", "drop_late")
         self._newest_only = drop_late
         self._began = monotonic()
         self._index = 0  # of the next frame grabbed

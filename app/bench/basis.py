@@ -13,7 +13,8 @@ from app.bench.own_process import apart
 from app.rivals.modal_analysis import vibration_modes
 from app.rivals.problems import MODES, surface_with_mesh
 from reconstruction.basis import distances, landmarks
-from reconstruction.basis.modes import EXACT_POINTS, Metric, doubly_centred, leading_eigenpairs
+from reconstruction.basis.modes import EXACT_POINTS, doubly_centred, leading_eigenpairs
+from reconstruction.settings import Metric
 
 POINTS = (56, 594, 3_024, 28_887)
 QUICK_POINTS = (56, 594, 28_887)

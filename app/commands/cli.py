@@ -17,7 +17,7 @@ from app.options.reproduce import Reproduce
 from app.options.retexture import Retexture
 from app.options.run import Demo, Evaluate, Review, Run
 from app.recording.environment import environment
-from app.terminal.errors import UsageError
+from app.terminal.errors import UsageError, in_a_line
 
 Command = (
     Annotated[Run, tyro.conf.subcommand("run")]
@@ -48,7 +48,7 @@ def main() -> NoReturn:
     except ValueError as error:
         if not is_ours(error):
             raise
-        fail(str(error))
+        fail(in_a_line(error))
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
 

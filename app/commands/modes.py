@@ -12,9 +12,10 @@ from app.options.export import Modes
 from app.options.run import Evaluate, Words
 from app.recording.modes_figure import modes_figure, spectrum, title_of
 from app.terminal.progress import Progress
-from reconstruction.basis.distances import Metric, MetricChoice, fitting
+from reconstruction.basis.distances import fitting
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.modes import ModalBasis, is_flat
+from reconstruction.settings import Metric, MetricChoice
 
 
 def modes(command: Modes, progress: Progress) -> Words:

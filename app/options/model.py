@@ -1,68 +1,62 @@
-"""What a person can choose about the model, for every command that reconstructs; nothing heavy is imported here."""
+"""The estimator's settings as options, for every command that reconstructs; nothing heavy is imported here."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import tyro
 
-from app.terminal.errors import UsageError
+from app.terminal.errors import UsageError, in_a_line
 from reconstruction import ReconstructionError
-from reconstruction.window.priors import Weights, check
+from reconstruction.settings import RecoveredRestShape, Settings
+
+
+def parsed_priors(text: str) -> Mapping[str, float]:
+    """The weights in `NAME=WEIGHT,…` by name.
+
+    Raises:
+        UsageError: not of that form.
+    """
+    try:
+        pairs = (part.split("=") for part in text.split(","))
+        return {name.strip(): float(weight) for name, weight in pairs}
+    except ValueError:
+        raise UsageError(
+            f"--priors {text} is no list of NAME=WEIGHT: give for instance rest=0.02,inextensibility=3"
+        ) from None
+
+
+def priors_text(priors: Mapping[str, float]) -> str | None:
+    """Weights by name as they are given; None without any."""
+    return ",".join(f"{name}={weight:g}" for name, weight in priors.items()) or None
+
+
+PRIORS = tyro.constructors.PrimitiveConstructorSpec(
+    nargs=1,
+    metavar="NAME=WEIGHT,…",
+    instance_from_str=lambda arguments: parsed_priors(arguments[0]),
+    is_instance=lambda value: isinstance(value, Mapping),
+    str_from_instance=lambda priors: [str(priors_text(priors))],
+)
 
 
 @dataclass(frozen=True)
-class Model:
+class Model(Settings):
     """What is reconstructed, and how."""
 
-    bootstrap_frames: Literal["auto"] | int = "auto"
-    """Frames the rest shape comes from; auto decides from the evidence."""
-    metric: Literal["auto", "euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"] = "auto"
-    """Distance between points that the modes come from: straight, along the mesh's edges, in units of the extent along
-    each axis, chi-squared of the coordinates, or Jensen-Shannon of the nearness to landmarks. Auto: Jensen-Shannon for a
-    solid rest shape, chi-squared for a flat one."""
-    modes: int = 20
-    """Number of modes r."""
-    deformation: Literal["auto", "bending", "stretching", "general", "inextensible"] = "auto"
-    """How the surface may deform: bend out of its plane, drawing in as a sheet does; in its plane; freely; freely, but
-    nearly keeping its lengths. Auto: general for a solid rest shape, inextensible for a flat one."""
-    window: int = 3
-    """Frames adjusted together."""
-    energy: Literal["anchored", "paper"] = "anchored"
-    """Anchored: tied to the past and pulled to rest. Paper: the paper's section 5 as printed (orthographic)."""
-    priors: Annotated[str | None, tyro.conf.arg(metavar="NAME=WEIGHT,…")] = None
-    """Weights of the energy's priors instead of its own, 0 for none: rest, smoothness, rotation, translation, scale,
-    inextensibility."""
-    refine_rest: bool = True
-    """Let later frames improve the rest shape. Not with --energy paper."""
+    # Each command has its own choice of these two.
+    rest_shape: tyro.conf.Suppress[RecoveredRestShape] = "auto"
+    estimate_focal: tyro.conf.Suppress[bool] = False
+    priors: Annotated[Mapping[str, float], PRIORS] = field(default_factory=dict)
     focal: float | Literal["auto"] | None = None
     """Focal length in pixels; auto: from the first frames where they hold it, as a run has it without this option, else the
     picture's width. Without it, evaluate takes that of the file."""
 
     def __post_init__(self) -> None:
-        if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:
-            raise UsageError(f"--bootstrap-frames {self.bootstrap_frames} is too few: give auto, or 2 and more")
-        if self.modes < 1:
-            raise UsageError(f"--modes {self.modes} is too few: give 1 and more")
-        if self.window < 1:
-            raise UsageError(f"--window {self.window} is too short: give 1 and more")
+        try:
+            super().__post_init__()
+        except ReconstructionError as error:
+            given = f"--priors {priors_text(self.priors)}: " if error.about == "priors" else ""
+            raise UsageError(given + in_a_line(error)) from error
         if isinstance(self.focal, float) and not self.focal > 0:
             raise UsageError(f"--focal {self.focal} is no focal length: give pixels, more than 0")
-        try:
-            check(self.weights)
-        except ReconstructionError as error:
-            raise UsageError(f"--priors {self.priors}: {error}") from error
-
-    @property
-    def weights(self) -> Weights:
-        """The weights of `priors` by name.
-
-        Raises:
-            UsageError: not of that form.
-        """
-        try:
-            pairs = (part.split("=") for part in self.priors.split(",")) if self.priors else ()
-            return {name.strip(): float(weight) for name, weight in pairs}
-        except ValueError:
-            raise UsageError(
-                f"--priors {self.priors} is no list of NAME=WEIGHT: give for instance rest=0.02,inextensibility=3"
-            ) from None

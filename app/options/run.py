@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.options.model import Model
+from app.options.model import Model, priors_text
 from app.terminal.errors import UsageError
 
 Words = dict[str, object]
@@ -226,8 +226,10 @@ def parse_range(text: str) -> tuple[int, int | None]:
 def as_words(config: Run | Evaluate) -> Words:
     """The configuration as a flat dictionary, as it is stored in a recording."""
     words = asdict(config)
-    for group in ("model", "output"):
-        words.update(words.pop(group, {}))
+    model = words.pop("model")
+    model["priors"] = priors_text(model["priors"])
+    chosen_above = ("rest_shape", "estimate_focal")
+    words.update({name: value for name, value in model.items() if name not in chosen_above} | words.pop("output", {}))
     return {
         name: list(v) if isinstance(v, tuple) else v if isinstance(v, int | float | None) else str(v)
         for name, v in words.items()

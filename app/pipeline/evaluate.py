@@ -86,7 +86,7 @@ def prepare(config: Evaluate, tracks: Tracks) -> Reconstruction:
         UsageError: no such rest shape or camera in the file.
     """
     given, mesh = given_rest_shape(config, tracks)
-    settings = settings_of(config.model, config.rest_shape)
+    settings = settings_of(config.model, config.rest_shape, estimate_focal=config.model.focal == "auto")
     return Reconstruction(camera_of(config, tracks), settings, given, mesh)
 
 

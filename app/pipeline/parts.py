@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.recording.recorder import Recorder
-from reconstruction.basis.modes import Metric
+from reconstruction.settings import Metric
 from reconstruction.window.model import Model, ShapeEstimate
 from tracking.klt import Observation
 from tracking.video import Frame

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal, cast
+from typing import cast, get_args
 
 import cv2
 import numpy as np
@@ -12,14 +12,15 @@ from app.files.mesh_file import rest_of_surface
 from app.options.model import Model
 from app.options.run import Run
 from reconstruction.camera import Camera
-from reconstruction.online import Reconstruction, Settings
+from reconstruction.online import Reconstruction
+from reconstruction.settings import RecoveredRestShape, Settings
 from tracking.features import detect_corners
 from tracking.region import region_mask
 from tracking.video import Frame
 
 Array = NDArray[np.float64]
 
-RECOVERED = ("auto", "rigid", "plane")  # rest shapes that come from the first frames
+RECOVERED = get_args(RecoveredRestShape)  # rest shapes that come from the first frames
 
 
 def prepared(config: Run, first: Frame) -> tuple[Array, Reconstruction]:
@@ -35,24 +36,14 @@ def prepared(config: Run, first: Frame) -> tuple[Array, Reconstruction]:
     model = config.model
     focal = model.focal if isinstance(model.focal, float) else float(width)
     camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
-    settings = replace(settings_of(model, config.rest_shape), estimate_focal=not isinstance(model.focal, float))
+    settings = settings_of(model, config.rest_shape, estimate_focal=not isinstance(model.focal, float))
     if config.rest_shape in RECOVERED:
         return points_px, Reconstruction(camera, settings)
     given, inside = rest_of_surface(Path(config.rest_shape), points_px, camera)
     return points_px[inside], Reconstruction(camera, settings, given)
 
 
-def settings_of(model: Model, rest_shape: str) -> Settings:
-    """The estimator's settings; a rest shape that is not to be recovered is given to it."""
-    return Settings(
-        rest_shape=cast(Literal["auto", "rigid", "plane"], rest_shape if rest_shape in RECOVERED else "auto"),
-        bootstrap_frames=None if model.bootstrap_frames == "auto" else model.bootstrap_frames,
-        modes=model.modes,
-        metric=model.metric,
-        deformation=model.deformation,
-        window=model.window,
-        energy=model.energy,
-        priors=model.weights,
-        refine_rest=model.refine_rest,
-        estimate_focal=model.focal == "auto",
-    )
+def settings_of(model: Model, rest_shape: str, *, estimate_focal: bool) -> Settings:
+    """The estimator's settings with what a command decides by itself; a rest shape from elsewhere overrides them."""
+    recovered = cast(RecoveredRestShape, rest_shape) if rest_shape in RECOVERED else "auto"
+    return replace(model, rest_shape=recovered, estimate_focal=estimate_focal)

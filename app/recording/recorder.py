@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from app.recording.environment import environment
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
-from reconstruction.basis.modes import Metric, ModalBasis
+from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera
+from reconstruction.settings import Metric
 from reconstruction.window.model import ShapeEstimate
 from tracking.klt import Observation
 from tracking.video import Frame

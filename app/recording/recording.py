@@ -22,8 +22,9 @@ from app.recording.viewer import running_viewer, spawned_viewer
 from app.recording.wireframe import edge_strips, line_strips
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
-from reconstruction.basis.modes import Metric, ModalBasis
+from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera
+from reconstruction.settings import Metric
 from reconstruction.window.model import ShapeEstimate
 from tracking.klt import Observation
 from tracking.video import Frame

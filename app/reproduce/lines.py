@@ -5,7 +5,7 @@ from pathlib import Path
 
 from app.options.model import Model
 from app.options.run import Evaluate
-from reconstruction.basis.distances import MetricChoice
+from reconstruction.settings import MetricChoice
 
 
 @dataclass(frozen=True)

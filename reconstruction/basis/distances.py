@@ -10,11 +10,10 @@ from scipy.spatial.distance import cdist, pdist, squareform
 
 from reconstruction import ReconstructionError
 from reconstruction.basis.mesh import farthest_points
+from reconstruction.settings import Metric, MetricChoice
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-Metric = Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"]
-MetricChoice = Literal["auto"] | Metric
 
 THINNEST = 0.03  # variance added to each principal axis, as a share of their mean: a flat sheet has none across
 AWAY_FROM_ZERO = 0.05  # smallest coordinate of the chi-squared distance, in RMS radii: it compares positive numbers
@@ -65,7 +64,7 @@ def manhattan(rest: Array, edges: Indices, to: Indices | None = None) -> Array:
     D = np.asarray(dijkstra(graph, indices=to))
     if not np.isfinite(D).all():
         raise ReconstructionError(
-            "the mesh of the rest shape falls into pieces: use --metric euclidean, or a connected mesh"
+            "the mesh of the rest shape falls into pieces: use another metric, or a connected mesh", "metric"
         )
     return D if to is None else D.T
 

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh, pinvh
 
-from reconstruction.basis.distances import Metric, dissimilarity
+from reconstruction.basis.distances import dissimilarity
 from reconstruction.basis.mesh import farthest_points
+from reconstruction.settings import Metric
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

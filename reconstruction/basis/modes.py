@@ -10,9 +10,9 @@ from scipy.sparse.linalg import eigsh
 from reconstruction import ReconstructionError
 from reconstruction.basis import distances, landmarks
 from reconstruction.basis.mesh import Mesh
+from reconstruction.settings import Metric
 
 Array = NDArray[np.float64]
-Metric = distances.Metric
 
 FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
 EXACT_POINTS = 4000  # with more, modes come from the distances to landmarks: all of D would take minutes and gigabytes
@@ -53,7 +53,7 @@ def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean
     """
     p = rest.shape[1]
     if not 1 <= modes < p:
-        raise ReconstructionError(f"--modes {modes} does not fit {p} points: choose 1 to {p - 1}")
+        raise ReconstructionError(f"modes {modes} does not fit {p} points: choose 1 to {p - 1}", "modes")
     rest = rest - rest.mean(axis=1, keepdims=True)
     if p > exact_points(metric):
         eigenvalues, vectors = landmarks.leading_eigenpairs(rest, mesh.edges, modes, metric)

@@ -13,8 +13,9 @@ from reconstruction.camera import Camera
 from reconstruction.mapping import rest_shape
 from reconstruction.mapping.rest_shape import RestShape
 from reconstruction.mapping.sheet import sheet
+from reconstruction.settings import Deformation
 from reconstruction.state import join
-from reconstruction.window.constraints import Deformation, build_energy, chosen
+from reconstruction.window.constraints import build_energy, chosen
 from reconstruction.window.energy import Energy
 from reconstruction.window.model import Model, build_model
 from reconstruction.window.solver import Solver, minimise
@@ -177,4 +178,4 @@ def search(cost: Callable[[float], float], start_px: float) -> FocalEstimate:
 
 def assumed(focal_px: float, why: str) -> str:
     """The words for a focal length that was not found."""
-    return f"focal length {focal_px:.0f} px assumed: {why}; give --focal if you know better"
+    return f"focal length {focal_px:.0f} px assumed: {why}; give it if you know better"

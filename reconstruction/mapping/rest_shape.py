@@ -105,7 +105,8 @@ def rigid(W: Array, visible: Visibility, camera: Camera) -> RestShape:
     if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL_PX:
         raise ReconstructionError(
             f"cannot recover a rest shape: the object turned {turned:.1f}° in {len(W)} frames, about "
-            f"{TURN_DEGREES:.0f}° are needed; give one with --rest-shape plane or --rest-shape mesh.obj"
+            f"{TURN_DEGREES:.0f}° are needed",
+            "rest_shape",
         )
     start = factorize_often_seen(W, visible)
     start = replace(start, t=start.t - camera.center_px)
@@ -127,7 +128,7 @@ def factorize_often_seen(W: Array, visible: Visibility) -> RigidMotion:
     """
     often = visible.sum(axis=0) >= max(3, 0.2 * len(W))
     if often.sum() < 4:
-        raise ReconstructionError("cannot recover a rest shape: fewer than 4 points stay visible; give --rest-shape plane")
+        raise ReconstructionError("cannot recover a rest shape: fewer than 4 points stay visible", "rest_shape")
     while True:
         motion = factorize(W[:, :, often], visible[:, often]).motion
         distance = np.linalg.norm(motion.shape - np.median(motion.shape, axis=1, keepdims=True), axis=0)

@@ -1,17 +1,16 @@
 """What is known of how a surface deforms (paper §3.4): rows of Λ that stay zero, and how hard the others are held."""
 
 from collections.abc import Mapping
-from typing import Literal
 
 import numpy as np
 
 from reconstruction.mapping.rest_shape import RestShape
+from reconstruction.settings import Deformation
 from reconstruction.window import priors
 from reconstruction.window.edges import Bending
 from reconstruction.window.energy import Energy
 from reconstruction.window.model import Model
 
-Deformation = Literal["auto", "bending", "stretching", "general", "inextensible"]
 ROWS: dict[str, tuple[int, ...]] = {
     "bending": (2,),
     "stretching": (0, 1),

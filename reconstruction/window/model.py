@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction.basis.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges
-from reconstruction.basis.modes import Metric, ModalBasis, modal_basis, principal_axes
+from reconstruction.basis.modes import ModalBasis, modal_basis, principal_axes
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.mapping.rest_shape import RestShape
+from reconstruction.settings import Metric
 from reconstruction.state import State
 from reconstruction.window.ambiguity import Switch
 from reconstruction.window.edges import CoarseEdges

@@ -7,7 +7,7 @@ the mean squared reprojection error; any weights go together. The terms themselv
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from reconstruction import ReconstructionError
+from reconstruction.settings import PriorName
 
 Weights = dict[str, float]
 
@@ -40,7 +40,7 @@ class Prior:
         return next(self.default[case] for case in cases if case in self.default)
 
 
-PRIORS: dict[str, Prior] = {
+PRIORS: dict[PriorName, Prior] = {
     "rest": Prior(
         "λ_0 Σ_k ω_k ‖Λ'_k − Λ̄'_k‖², ω_k ∝ eigenvalue_k^(−½); where a surface may do anything, times the mean squared "
         "misfit so far over (1 %)², between 1 and 3",
@@ -67,7 +67,7 @@ PRIORS: dict[str, Prior] = {
     "scale": Prior(
         "λ_s (Δ log s)²",
         "The object stays as far away. Less for an orthographic camera that zooms, more for a perspective one before which "
-        "the object only turns. Of no effect with `--energy paper`, where s = 1.",
+        "the object only turns. Of no effect with the paper's energy, where s = 1.",
         {"general perspective": SWELLING_SCALE, "orthographic": ORTHOGRAPHIC_SCALE, "perspective": PERSPECTIVE_SCALE},
     ),
     "inextensibility": Prior(
@@ -82,28 +82,10 @@ PAPER: Weights = {"rest": 0.0, "smoothness": 1e-3, "inextensibility": 0.0}
 
 
 def weights(chosen: Mapping[str, float], deformation: str, *, perspective: bool, paper: bool) -> Weights:
-    """All weights by name: those chosen, and for the others the defaults, or the paper's.
-
-    Raises:
-        ReconstructionError: a name that no prior has, or a weight that is none.
-    """
-    check(chosen)
+    """All weights by name: those chosen, and for the others the defaults, or the paper's."""
     camera = "perspective" if perspective else "orthographic"
-    defaults = {name: prior.weight(deformation, camera) for name, prior in PRIORS.items()}
+    defaults: Weights = {name: prior.weight(deformation, camera) for name, prior in PRIORS.items()}
     return defaults | (PAPER if paper else {}) | dict(chosen)
-
-
-def check(chosen: Mapping[str, float]) -> None:
-    """See to it that weights can be chosen so.
-
-    Raises:
-        ReconstructionError: a name that no prior has, or a weight that is none.
-    """
-    for name, weight in chosen.items():
-        if name not in PRIORS:
-            raise ReconstructionError(f"there is no prior {name}: choose from {', '.join(PRIORS)}")
-        if not 0 <= weight < float("inf"):
-            raise ReconstructionError(f"{weight:g} is no weight for the prior {name}: give 0 (to leave it out) or more")
 
 
 def table() -> str:

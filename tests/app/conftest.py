@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.app.terminal import Command, in_process, still, turning, write_video
+from tests.app.command_line import Command, in_process, still, turning, write_video
 from tests.tracking.scene import SIZE
 
 

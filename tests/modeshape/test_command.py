@@ -8,7 +8,7 @@ import cv2
 import pytest
 
 from tests.app import terminal
-from tests.app.terminal import in_own_process, still, turning, write_video
+from tests.app.command_line import in_own_process, still, turning, write_video
 from tests.synthetic_run import verify
 
 OPTIONS = ("--rest-shape", "plane", "--bootstrap-frames", "8", "--points", "60", "--modes", "5", "--focal", "320")

@@ -109,7 +109,7 @@ def test_truth_points_are_followed_where_their_triangle_goes(rng: np.random.Gene
 
 def test_truth_outside_the_mesh_is_said() -> None:
     rest = relief(np.random.default_rng(0), POINTS)
-    with pytest.raises(ReconstructionError, match=r"fewer than 3 truth points lie inside the mesh.*--roi"):
+    with pytest.raises(ReconstructionError, match=r"fewer than 3 truth points lie inside the mesh"):
         followed([rest], [rest[:2].T], rest, triangulate(rest[:2].T), np.full((5, 2), 1e4))
 
 

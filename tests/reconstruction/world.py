@@ -5,8 +5,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from reconstruction.basis.mesh import triangulate
-from reconstruction.basis.modes import Metric, modal_basis
+from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import Camera, nearest_rotation, quaternion_exp, rotation_from_quaternion
+from reconstruction.settings import Metric
 from reconstruction.state import State
 from reconstruction.window.model import Model
 from reconstruction.window.statistics import Statistics, stack

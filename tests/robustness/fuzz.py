@@ -186,7 +186,7 @@ def make_samples(folder: Path) -> None:
     import cv2
     import trimesh
 
-    from tests.app.terminal import in_own_process, turning, write_video
+    from tests.app.command_line import in_own_process, turning, write_video
     from tests.tracking.scene import SIZE
 
     pictures = list(turning(16))

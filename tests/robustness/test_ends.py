@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from app.playback.playback import Playback
-from tests.app.terminal import ENVIRONMENT, PROGRAM, in_own_process, turning, write_video
+from tests.app.command_line import ENVIRONMENT, PROGRAM, in_own_process, turning, write_video
 from tests.synthetic_run import verify
 
 ARGUMENTS = ("--points", "120", "--rest-shape", "plane", "--bootstrap-frames", "5", "--modes", "6", "--out", "run.rrd")

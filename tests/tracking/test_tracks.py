@@ -51,7 +51,7 @@ def test_hidden_entries_may_be_nan(tmp_path: Path) -> None:
     ("change", "says"),
     [
         ({"W": None}, "has no array W (frames, 2, points), only K, S_gt, gt_frames, visible"),
-        ({"W": None, "W_px": W[:2]}, "with W_px it is a file of truth only, for --ground-truth"),
+        ({"W": None, "W_px": W[:2]}, "with W_px it is a file of truth only"),
         ({"W": W[0]}, "W has the shape (2, 7), but (frames, 2, points) is needed"),
         ({"W": np.moveaxis(W, 1, 2)}, "W has the shape (5, 7, 2), but (frames, 2, points) is needed"),
         ({"W": W[:0]}, "W has the shape (0, 2, 7), but"),

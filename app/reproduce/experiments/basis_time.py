@@ -13,7 +13,8 @@ from app.reproduce.result import Result, Table
 from app.reproduce.work import Effort, Work
 from app.rivals.modal_analysis import vibration_modes
 from reconstruction.basis.mesh import triangulate
-from reconstruction.basis.modes import Metric, modal_basis
+from reconstruction.basis.modes import modal_basis
+from reconstruction.settings import Metric
 
 MODES = 20
 METRICS: tuple[tuple[Metric, str], ...] = (

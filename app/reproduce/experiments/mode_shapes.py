@@ -11,7 +11,8 @@ from app.reproduce.lines import FLAG
 from app.reproduce.result import Result, Table
 from app.reproduce.work import Effort, Work
 from reconstruction.basis.mesh import Mesh, triangulate
-from reconstruction.basis.modes import Metric, modal_basis
+from reconstruction.basis.modes import modal_basis
+from reconstruction.settings import Metric
 from tracking.tracks import Tracks
 
 DRAWN = 5

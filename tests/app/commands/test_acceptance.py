@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.app.terminal import Command
+from tests.app.command_line import Command
 from tests.synthetic_run import verify
 
 FLAG = ("flag250.npz", "--rest-shape", "first-truth", "--metric", "euclidean", "--modes", 20, "--deformation", "bending")

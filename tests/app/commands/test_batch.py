@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from app.commands.batch_job import Job, reason
-from tests.app.terminal import ENVIRONMENT, PROGRAM, Command
+from tests.app.command_line import ENVIRONMENT, PROGRAM, Command
 from tests.synthetic_run import verify
 
 GOOD = ("a", "b", "c", "d")

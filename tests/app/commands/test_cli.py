@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.app.terminal import ENVIRONMENT, PROGRAM, Command, in_own_process, turning, write_video
+from tests.app.command_line import ENVIRONMENT, PROGRAM, Command, in_own_process, turning, write_video
 from tests.synthetic_run import verify
 
 RUN_KEYS = {

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.app.terminal import Command, Outcome, in_own_process
+from tests.app.command_line import Command, Outcome, in_own_process
 from tests.synthetic_run import verify
 
 AV1 = Path(__file__).parents[2] / "tracking" / "data" / "av1.mp4"

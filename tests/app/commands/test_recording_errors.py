@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import rerun as rr
 
-from tests.app.terminal import ENVIRONMENT, Command, Outcome
+from tests.app.command_line import ENVIRONMENT, Command, Outcome
 from tests.synthetic_run import write_run
 
 FRAMES = 120

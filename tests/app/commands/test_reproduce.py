@@ -8,7 +8,7 @@ import pytest
 
 from app.commands.reproduce import reproduce
 from app.options.reproduce import Reproduce
-from tests.app.terminal import Command
+from tests.app.command_line import Command
 
 
 @pytest.mark.parametrize("readme", ["absent.md", "plain.md"])

@@ -21,7 +21,7 @@ from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
-from tests.app.terminal import Command, in_own_process
+from tests.app.command_line import Command, in_own_process
 from tests.synthetic_run import SIZE, picture, write_run
 from tracking.video import Video
 

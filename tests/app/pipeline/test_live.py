@@ -14,8 +14,8 @@ from app.options.run import Output, Run
 from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.progress import Progress
+from tests.app.command_line import Command, turning
 from tests.app.mjpeg import RATE, Camera, number_in
-from tests.app.terminal import Command, turning
 from tracking import TrackingError
 from tracking.guarded import Guarded, GuardedTracker
 from tracking.video import Video

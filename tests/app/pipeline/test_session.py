@@ -118,9 +118,9 @@ def test_recordings_are_named_after_their_source(source: str, name: str, here: P
 
 def test_priors_are_recorded_as_they_were_asked_for_and_as_they_were(videos: Path) -> None:
     asked = config(videos)
-    words = Session(replace(asked, model=replace(asked.model, priors="rest=0.5, scale=0")), Progress()).run()
+    words = Session(replace(asked, model=replace(asked.model, priors={"rest": 0.5, "scale": 0})), Progress()).run()
     playback = Playback.load(Path("run.rrd"))
-    assert playback.configuration["priors"] == "rest=0.5, scale=0"
+    assert playback.configuration["priors"] == "rest=0.5,scale=0"
     assert playback.summary is not None
     assert playback.summary["priors"] == words["priors"]
     assert words["priors"] == {

@@ -22,7 +22,7 @@ from app.playback.playback import Playback
 from app.terminal.progress import Progress
 from reconstruction.window.model import Model as Shapes
 from reconstruction.window.model import ShapeEstimate
-from tests.app.terminal import Command, grain, in_own_process, turning, write_video
+from tests.app.command_line import Command, grain, in_own_process, turning, write_video
 from tests.synthetic_run import verify
 from tests.tracking.scene import SIZE, texture
 from tracking.klt import Observation

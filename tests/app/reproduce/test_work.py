@@ -16,4 +16,4 @@ def test_a_trial_is_computed_once_and_fails_in_words(tmp_path: Path) -> None:
         assert work.evaluated(config) is first
         failed = work.evaluated(FLAG.config(tmp_path, modes=40))
     assert failed["e3d"] is None
-    assert "--modes 40" in failed.failure
+    assert "modes 40" in failed.failure

@@ -9,7 +9,8 @@ from scipy.linalg import subspace_angles
 from reconstruction import ReconstructionError
 from reconstruction.basis import distances, landmarks, modes
 from reconstruction.basis.mesh import Mesh, triangulate
-from reconstruction.basis.modes import Metric, doubly_centred, modal_basis
+from reconstruction.basis.modes import doubly_centred, modal_basis
+from reconstruction.settings import Metric
 from tests.reconstruction.world import flat, relief
 
 METRICS: tuple[Metric, ...] = get_args(Metric)

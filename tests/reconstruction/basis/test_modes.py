@@ -128,5 +128,5 @@ def test_lanczos_repeats_exactly() -> None:
 
 @pytest.mark.parametrize("modes", [0, 20, 21])
 def test_as_many_modes_as_points_are_refused(modes: int) -> None:
-    with pytest.raises(ReconstructionError, match=rf"--modes {modes} does not fit 20 points: choose 1 to 19"):
+    with pytest.raises(ReconstructionError, match=rf"modes {modes} does not fit 20 points: choose 1 to 19"):
         basis_of(relief(np.random.default_rng(0), 20), modes)

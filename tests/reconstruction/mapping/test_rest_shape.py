@@ -91,9 +91,7 @@ def test_points_seen_in_a_few_frames_much_alike_do_not_spoil_the_shape(seed: int
 def test_a_still_object_has_no_shape_and_the_error_says_how_much_it_turned() -> None:
     rng = np.random.default_rng(0)
     W, visible = views(relief(rng, POINTS), np.broadcast_to(np.eye(3), (FRAMES, 3, 3)), PERSPECTIVE)
-    with pytest.raises(
-        ReconstructionError, match=r"turned \d+\.\d° in 15 frames, about 10° are needed; .*--rest-shape plane"
-    ):
+    with pytest.raises(ReconstructionError, match=r"turned \d+\.\d° in 15 frames, about 10° are needed"):
         rest_shape.rigid(W + rng.normal(0, 0.05, W.shape), visible, PERSPECTIVE)
 
 

@@ -9,7 +9,8 @@ from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.mapping import rest_shape
 from reconstruction.online import Reconstruction, Settings
-from reconstruction.window.constraints import Deformation, build_energy
+from reconstruction.settings import Deformation
+from reconstruction.window.constraints import build_energy
 from reconstruction.window.model import ShapeEstimate
 from reconstruction.window.priors import PRIORS, Weights, table, weights
 from reconstruction.window.window import SlidingWindow

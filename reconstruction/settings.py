@@ -1,0 +1,63 @@
+"""What can be chosen about a reconstruction; imports nothing heavy, so that a command line can read it at once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from reconstruction import ReconstructionError
+
+Metric = Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"]
+MetricChoice = Literal["auto", Metric]
+Deformation = Literal["auto", "bending", "stretching", "general", "inextensible"]
+RecoveredRestShape = Literal["auto", "rigid", "plane"]
+PriorName = Literal["rest", "smoothness", "rotation", "translation", "scale", "inextensibility"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to reconstruct.
+
+    Raises:
+        ReconstructionError: a value that cannot be used; `about` is the field's name.
+    """
+
+    rest_shape: RecoveredRestShape = "auto"
+    """How the rest shape is found; a given one overrides it."""
+    bootstrap_frames: Literal["auto"] | int = "auto"
+    """Frames the rest shape comes from; auto decides from the evidence."""
+    metric: MetricChoice = "auto"
+    """Distance between points that the modes come from: straight, along the mesh's edges, in units of the extent along
+    each axis, chi-squared of the coordinates, or Jensen-Shannon of the nearness to landmarks. Auto: Jensen-Shannon for a
+    solid rest shape, chi-squared for a flat one."""
+    modes: int = 20
+    """Number of modes r."""
+    deformation: Deformation = "auto"
+    """How the surface may deform: bend out of its plane, drawing in as a sheet does; in its plane; freely; freely, but
+    nearly keeping its lengths. Auto: general for a solid rest shape, inextensible for a flat one."""
+    window: int = 3
+    """Frames adjusted together."""
+    energy: Literal["anchored", "paper"] = "anchored"
+    """Anchored: tied to the past and pulled to rest. Paper: the paper's section 5 as printed (orthographic)."""
+    priors: Mapping[str, float] = field(default_factory=dict)
+    """Weights of the energy's priors instead of its own, 0 for none: rest, smoothness, rotation, translation, scale,
+    inextensibility."""
+    refine_rest: bool = True
+    """Let later frames improve the rest shape. Not with the paper's energy."""
+    estimate_focal: bool = False
+    """Find the focal length of a perspective camera from the first frames where they hold it."""
+
+    def __post_init__(self) -> None:
+        if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:
+            problem = f"bootstrap_frames {self.bootstrap_frames} is too few: give auto, or 2 and more"
+            raise ReconstructionError(problem, "bootstrap_frames")
+        if self.modes < 1:
+            raise ReconstructionError(f"modes {self.modes} is too few: give 1 and more", "modes")
+        if self.window < 1:
+            raise ReconstructionError(f"window {self.window} is too short: give 1 and more", "window")
+        names = get_args(PriorName)
+        for name, weight in self.priors.items():
+            if name not in names:
+                raise ReconstructionError(f"there is no prior {name}: choose from {', '.join(names)}", "priors")
+            if not 0 <= weight < float("inf"):
+                problem = f"{weight:g} is no weight for the prior {name}: give 0 (to leave it out) or more"
+                raise ReconstructionError(problem, "priors")
