@@ -38,7 +38,7 @@ class Settings:
     """Frames adjusted together."""
     energy: Literal["anchored", "paper"] = "anchored"
     """Anchored: tied to the past and pulled to rest. Paper: the paper's section 5 as printed (orthographic)."""
-    priors: Mapping[str, float] = field(default_factory=dict)
+    priors: Mapping[str, float] = field(default_factory=dict, hash=False)
     """Weights of the energy's priors instead of its own, 0 for none: rest, smoothness, rotation, translation, scale,
     inextensibility."""
     refine_rest: bool = True

@@ -47,7 +47,7 @@ class Model(Settings):
     # Each command has its own choice of these two.
     rest_shape: tyro.conf.Suppress[RecoveredRestShape] = "auto"
     estimate_focal: tyro.conf.Suppress[bool] = False
-    priors: Annotated[Mapping[str, float], PRIORS] = field(default_factory=dict)
+    priors: Annotated[Mapping[str, float], PRIORS] = field(default_factory=dict, hash=False)
     focal: float | Literal["auto"] | None = None
     """Focal length in pixels; auto: from the first frames where they hold it, as a run has it without this option, else the
     picture's width. Without it, evaluate takes that of the file."""

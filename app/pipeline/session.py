@@ -22,7 +22,7 @@ from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import Successor, for_another
 from app.pipeline.tracked_object import Settled, Take
 from app.recording.recorder import Recorder
-from app.terminal.errors import UsageError
+from app.terminal.errors import UsageError, in_a_line
 from app.terminal.progress import Progress
 from reconstruction import ReconstructionError
 from tracking.guarded import Change, Guarded
@@ -185,7 +185,7 @@ class Session:
         try:
             self._settle(self._take.finish())
         except ReconstructionError as error:  # it was lost before its bootstrap was over
-            self._progress.say(str(error))
+            self._progress.say(in_a_line(error))
         self._take.save()
         text = (
             f"another object from frame {frame.index} on: followed since frame {take.first.index}, "
@@ -206,7 +206,7 @@ class Session:
         except ReconstructionError as error:
             if not self._interrupted:
                 raise
-            self._progress.say(str(error))
+            self._progress.say(in_a_line(error))
             return
         with self._watch.time("record"):
             self._settle(settled)

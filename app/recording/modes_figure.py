@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
-from reconstruction.basis.distances import Metric, dissimilarity
+from reconstruction.basis.distances import dissimilarity
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.modes import ModalBasis, doubly_centred, exact_points
+from reconstruction.settings import Metric
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

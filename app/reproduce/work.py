@@ -13,6 +13,7 @@ from rich.progress import Progress as Bars
 from app.options.run import Evaluate, Words
 from app.pipeline.evaluate import evaluate
 from app.reproduce.part import Part
+from app.terminal.errors import in_a_line
 from app.terminal.progress import stderr
 from reconstruction import ReconstructionError
 
@@ -99,6 +100,6 @@ class Work:
             try:
                 self._trials[config] = Trial(evaluate(config, Part()))
             except ReconstructionError as error:
-                self._trials[config] = Trial({}, str(error))
+                self._trials[config] = Trial({}, in_a_line(error))
         self.step()
         return self._trials[config]

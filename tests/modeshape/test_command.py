@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import pytest
 
-from tests.app import terminal
+from tests.app import command_line
 from tests.app.command_line import in_own_process, still, turning, write_video
 from tests.synthetic_run import verify
 
@@ -48,7 +48,7 @@ def test_bench_beside_foreign_modules(folder: Path) -> None:
 
 
 def test_python_path_with_the_current_folder(folder: Path, video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = os.pathsep.join([".", terminal.ENVIRONMENT["PYTHONPATH"]])
-    monkeypatch.setitem(terminal.ENVIRONMENT, "PYTHONPATH", path)
+    path = os.pathsep.join([".", command_line.ENVIRONMENT["PYTHONPATH"]])
+    monkeypatch.setitem(command_line.ENVIRONMENT, "PYTHONPATH", path)
     done = in_own_process(folder, "run", video, *OPTIONS, "--out", "run.rrd")
     assert done.code == 0, done.err

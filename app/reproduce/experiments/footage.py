@@ -16,6 +16,7 @@ from app.reproduce.part import Part
 from app.reproduce.result import Headline, Result, Table, percent
 from app.reproduce.strip import strip
 from app.reproduce.work import Effort, Trial, Work
+from app.terminal.errors import in_a_line
 from reconstruction import ReconstructionError
 
 PAPER_VIDEO, PAPER_TRUTH, FACE_VIDEO = "kinect_paper.mp4", "kinect_paper_gt.npz", "talking_face.mp4"
@@ -65,7 +66,7 @@ def filmed(work: Work, footage: Footage) -> Result:
         try:
             trial = Trial(Session(run, Part(partial(work.step, 1 / expected_frames(run)))).run())
         except ReconstructionError as error:
-            trial = Trial({}, str(error))
+            trial = Trial({}, in_a_line(error))
             remarks.append(f"{trial.failure}.")
         e3d, static = percent(trial["e3d"]), percent(trial["e3d_static"])
         rows.append(
