@@ -14,8 +14,8 @@ from app.files.video_out import PacedVideo, VideoSink, check_video_format
 from app.files.writing import check_free
 from app.options.retexture import Retexture
 from app.options.run import Words, parse_range
-from app.painting.compositing import Compositor, Laid
-from app.painting.picture import Artwork
+from app.painting.compositing import Compositor, Placement
+from app.painting.picture import Texture
 from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
@@ -42,7 +42,7 @@ def retexture(command: Retexture, progress: Progress) -> Words:
     """
     check_video_format(command.out)
     check_free(command.out, overwrite=command.overwrite)
-    with Artwork(command.texture) as artwork, Painter(command, artwork) as painter:
+    with Texture(command.texture) as texture, Painter(command, texture) as painter:
         if is_recording(command.source):
             words = play(command, painter, progress)
         else:
@@ -55,12 +55,12 @@ class Painter:
 
     Args:
         command: what the person asked for.
-        artwork: the picture or video put on the surface.
+        texture: the picture or video put on the surface.
     """
 
-    def __init__(self, command: Retexture, artwork: Artwork) -> None:
-        self._out, self._laid = command.out, Laid(command.place, command.opacity)
-        self._artwork = artwork
+    def __init__(self, command: Retexture, texture: Texture) -> None:
+        self._out, self._placement = command.out, Placement(command.place, command.opacity)
+        self._texture = texture
         self._sink: VideoSink | None = None
         self._compositor: Compositor | None = None
         self._begun_s = 0.0
@@ -81,7 +81,9 @@ class Painter:
             self._compositor = None
             return
         perspective = model.camera.perspective
-        self._compositor = Compositor(first.image, points_px, model.mesh, perspective=perspective, laid=self._laid)
+        self._compositor = Compositor(
+            first.image, points_px, model.mesh, perspective=perspective, placement=self._placement
+        )
         height, width = first.image.shape[:2]
         self._sink = VideoSink(self._out, (width, height), fps).__enter__()
         self._paced = PacedVideo(self._sink, fps)
@@ -93,7 +95,7 @@ class Painter:
             return
         image = frame.image
         if estimate is not None and self._compositor is not None:
-            picture = self._artwork.at(frame.time_s - self._begun_s)
+            picture = self._texture.at(frame.time_s - self._begun_s)
             started = perf_counter()
             image = self._compositor.paint(image, picture, estimate.projection_px, estimate.shape[2], observation.points_px)
             self._elapsed_s += perf_counter() - started

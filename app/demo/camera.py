@@ -12,10 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import Array, Flags, Floats
 from app.demo.hand import hand_layer
 from app.demo.motion import HEIGHT_MM, WIDTH_MM, Surface, grid, surface
-
-Floats = NDArray[np.float32]
 
 SIZE = (640, 480)
 """Width and height of the video."""
@@ -56,18 +55,18 @@ def render(frame: int, *, hand: bool = True) -> NDArray[np.uint8]:
     return np.clip(np.rint(picture, out=picture), 0, 255).astype(np.uint8)
 
 
-def true_shape(frame: int) -> NDArray[np.float64]:
+def true_shape(frame: int) -> Array:
     """Where the points of `motion.grid()` are in a frame: (n, 3) mm in camera axes."""
     return surface(frame).points(grid()[0])
 
 
-def project(points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+def project(points_mm: Array) -> Array:
     """Pixels (n, 2) of points (n, 3) in camera axes."""
     image = points_mm @ K.T
     return np.asarray(image[:, :2] / image[:, 2:], float)
 
 
-def shading(sheet: Surface, xy_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+def shading(sheet: Surface, xy_mm: Array) -> Array:
     """Light (n,) that sheet points (n, 2) send on, 1 = white paper facing the lamp at its mean distance."""
     to_lamp = _LAMP_MM - sheet.points(xy_mm)
     distance = np.linalg.norm(to_lamp, axis=1)
@@ -76,7 +75,7 @@ def shading(sheet: Surface, xy_mm: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(light, float)
 
 
-def occluder(frame: int) -> NDArray[np.bool_]:
+def occluder(frame: int) -> Flags:
     """The pixels (480, 640) that the hand covers."""
     layer = hand_layer(frame, SIZE)
     return np.zeros(SIZE[::-1], bool) if layer is None else layer.alpha > 0.5
@@ -106,7 +105,7 @@ def sheet_at(sheet: Surface, x_px: Floats, y_px: Floats) -> tuple[Floats, Floats
     return c * arc - s * along, s * arc + c * along
 
 
-def _sight_table(sheet: Surface, eye: NDArray[np.float64]) -> tuple[Floats, float, float]:
+def _sight_table(sheet: Surface, eye: Array) -> tuple[Floats, float, float]:
     """For evenly spaced slopes of the line of sight: arc length where it first meets the sheet, and depth.
 
     (1, n, 2), with the slope of the first entry and the step between entries.
@@ -189,7 +188,7 @@ def _shadow(sheet: Surface) -> Floats:
     return np.asarray(cv2.resize(soft, SIZE, interpolation=cv2.INTER_CUBIC).clip(0, 1), np.float32)
 
 
-def _edge(side: float) -> NDArray[np.float64]:
+def _edge(side: float) -> Array:
     x = np.linspace(-0.5, 0.5, 40) * WIDTH_MM
     return np.column_stack([x, np.full_like(x, side * HEIGHT_MM)])
 

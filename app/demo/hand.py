@@ -5,10 +5,9 @@ from functools import cache
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-Floats = NDArray[np.float32]
+from app.arrays import Array, Floats
 
 FIRST_FRAME, LAST_FRAME = 196, 238
 """The hand is in the picture in these frames at most."""
@@ -107,7 +106,7 @@ def _sprite() -> Floats:
     return np.asarray(cv2.GaussianBlur(sprite, (0, 0), 0.8), np.float32)
 
 
-def _limbs(limbs: NDArray[np.float64], softness: float) -> tuple[Floats, Floats]:
+def _limbs(limbs: Array, softness: float) -> tuple[Floats, Floats]:
     """Signed distance to the union of the limbs (negative inside), and their height above the paper, px."""
     width, height = _CANVAS
     y, x = np.mgrid[0:height, 0:width].astype(np.float32)

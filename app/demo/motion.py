@@ -10,10 +10,9 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-Floats = NDArray[np.float64]
+from app.arrays import Array, Indices
 
 WIDTH_MM, HEIGHT_MM = 297.0, 210.0
 """The sheet: A4, lying."""
@@ -57,20 +56,20 @@ _KEYS = np.array(
 class Surface:
     """The sheet at one instant."""
 
-    axes: Floats
+    axes: Array
     """(3, 3) columns in camera axes: across the rulings, along them, and the flat sheet's normal, forward."""
-    origin: Floats
+    origin: Array
     """(3,) mm, the mean of the curve between the sheet's edges, in camera axes."""
     along_rad: float
     """The page direction across the rulings, from the page's x axis towards its y axis."""
-    arc: Floats
+    arc: Array
     """(n,) mm, arc length across the rulings from the sheet's centre, evenly spaced, past the edges."""
-    curve: Floats
+    curve: Array
     """(n, 2) mm, the curved cross-section: along axes[:, 0] and axes[:, 2]."""
-    slope_rad: Floats
+    slope_rad: Array
     """(n,) the curve's tangent angle."""
 
-    def points(self, xy_mm: Floats) -> Floats:
+    def points(self, xy_mm: Array) -> Array:
         """Camera coordinates (n, 3) of sheet points (n, 2)."""
         across, along = self._split(xy_mm)
         local = np.stack(
@@ -82,14 +81,14 @@ class Surface:
         )
         return (self.axes @ local).T + self.origin
 
-    def normals(self, xy_mm: Floats) -> Floats:
+    def normals(self, xy_mm: Array) -> Array:
         """Unit normals (n, 3) towards the camera's side of the page, at sheet points (n, 2)."""
         across, _ = self._split(xy_mm)
         slope = np.interp(across, self.arc, self.slope_rad)
         normals = self.axes @ np.stack([np.sin(slope), np.zeros_like(slope), -np.cos(slope)])
         return np.asarray(normals.T, float)
 
-    def _split(self, xy_mm: Floats) -> tuple[Floats, Floats]:
+    def _split(self, xy_mm: Array) -> tuple[Array, Array]:
         c, s = np.cos(self.along_rad), np.sin(self.along_rad)
         return xy_mm @ (c, s), xy_mm @ (-s, c)
 
@@ -115,7 +114,7 @@ def surface(frame: int) -> Surface:
     return Surface(turned @ page, np.array([x, y, z]), float(along_rad), arc, curve, slope)
 
 
-def grid(columns: int = 27, rows: int = 19) -> tuple[Floats, NDArray[np.int64]]:
+def grid(columns: int = 27, rows: int = 19) -> tuple[Array, Indices]:
     """Sheet points (columns·rows, 2) in mm, row by row, and triangles (m, 3) that cover the sheet."""
     x = np.linspace(-0.5, 0.5, columns) * WIDTH_MM
     y = np.linspace(-0.5, 0.5, rows) * HEIGHT_MM
@@ -130,7 +129,7 @@ def _keyed() -> PchipInterpolator:
     return PchipInterpolator(_KEYS[:, 0], _KEYS[:, 1:])
 
 
-def _turn(yaw: float, pitch: float, roll: float) -> Floats:
+def _turn(yaw: float, pitch: float, roll: float) -> Array:
     """Rotation (3, 3): roll in the page first, then pitch, then yaw."""
     cy, sy, cp, sp, cr, sr = (f(angle) for angle in (yaw, pitch, roll) for f in (np.cos, np.sin))
     about_y = np.array([(cy, 0, sy), (0, 1, 0), (-sy, 0, cy)])

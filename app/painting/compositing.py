@@ -1,73 +1,68 @@
-"""A picture put on the moving surface, into the video: in its light, behind what is in front of it."""
+"""Compositing: a picture on the moving surface in the video, with the surface's shading, behind what occludes it."""
 
 from dataclasses import dataclass
 from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from app.arrays import Array, Flags, Floats, Image, Mask
 from app.painting import shading
-from app.painting.occlusion import in_front
-from app.painting.picture import Box, Levels
+from app.painting.occlusion import occlusion_mask
+from app.painting.picture import Box, Pyramid
 from app.painting.raster import Rasteriser, SurfaceMap
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
 from reconstruction.window.model import Model
 
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
-Image = NDArray[np.uint8]
-Flags = NDArray[np.bool_]
-
-ROUNDS = 20  # of passing on, from neighbour to neighbour, how far the points are seen off the shape
-OUTLIER_PX = 1.5  # a point farther off than its neighbours by this counts half
+ROUNDS = 20  # of diffusing the points' offsets from the shape over their neighbours
+OUTLIER_PX = 1.5  # a point whose offset differs from its neighbours' by this counts half
 PAPER = 0.95  # of a picture's full white is what bare paper shows
-FEATHER_PX = 0.6  # half-resolution px, of the outline of what is in front
+FEATHER_PX = 0.6  # half-resolution px, of the mask
 
 
 @dataclass(frozen=True)
-class Laid:
-    """Where a picture lies: x, y, width, height in px of the first frame (None: over the whole mesh), and its opacity."""
+class Placement:
+    """Where a picture lies in the first frame: x, y, width, height px (None: over the whole mesh); and its opacity."""
 
     place: Box | None = None
     opacity: float = 1.0
 
 
 class Compositor:
-    """Paints frame after frame, in order; a hand or a fold is recognised by the frames before, too.
+    """Paints frame after frame, in order: shading and occlusion mask are carried from each to the next.
 
     Args:
         first: (H, W, 3) BGR the first frame.
         reference_px: (p, 2) the vertices in it.
         mesh: the surface.
         perspective: whether the camera is.
-        laid: where the picture lies.
+        placement: where the picture lies.
 
     Raises:
         UsageError: that is not on the surface.
     """
 
     def __init__(
-        self, first: Image, reference_px: Array, mesh: Mesh, *, perspective: bool, laid: Laid | None = None
+        self, first: Image, reference_px: Array, mesh: Mesh, *, perspective: bool, placement: Placement | None = None
     ) -> None:
-        laid = laid or Laid()
+        placement = placement or Placement()
         self._size = first.shape[1::-1]
         first = even(first)
         h, w = first.shape[:2]
-        self._opacity = laid.opacity
-        self._place = laid.place or bounding_box(reference_px)
+        self._opacity = placement.opacity
+        self._place = placement.place or bounding_box(reference_px)
         self._reference_px = reference_px
         self._raster = Rasteriser(mesh.faces, reference_px, (w, h), perspective=perspective)
         self._reference = shading.Reference(first)
         self._shade = np.ones((h // 2, w // 2), np.float32)
-        self._hidden = np.zeros((h // 2, w // 2), np.uint8)
+        self._mask = np.zeros((h // 2, w // 2), np.uint8)
         self._averages = neighbour_averages(mesh, len(reference_px))
-        still = self._raster.map(reference_px, np.ones(len(reference_px)))
+        first_map = self._raster.map(reference_px, np.ones(len(reference_px)))
         covered = np.zeros((h, w), np.uint8)
-        if still is not None:
-            covered[still.region] = still.cover == 1
+        if first_map is not None:
+            covered[first_map.region] = first_map.cover == 1
         x, y, wide, tall = self._place
         if not covered[max(y, 0) : max(y + tall, 0), max(x, 0) : max(x + wide, 0)].any():
             across, down = np.column_stack([reference_px.min(axis=0), reference_px.max(axis=0)]).round().astype(int)
@@ -75,9 +70,9 @@ class Compositor:
                 f"--place {x} {y} {wide} {tall} is not on the surface, which is between {across[0]} and {across[1]} across "
                 f"and {down[0]} and {down[1]} down in the first frame"
             )
-        self._still, self._first = still, first
+        self._first_map, self._first = first_map, first
         self._white = shading.white_level(first, covered)
-        self._levels: tuple[Image, Levels] | None = None
+        self._pyramid: tuple[Image, Pyramid] | None = None
 
     def paint(self, image: Image, picture: Image, projection_px: Array, depth: Array, observed_px: Array) -> Image:
         """A frame with the picture on the surface; pixels outside the surface stay as they are.
@@ -90,7 +85,7 @@ class Compositor:
             observed_px: (p, 2) where they are seen, NaN where they are not.
         """
         visible = np.isfinite(observed_px[:, 0])
-        points = self.settled(projection_px, observed_px, visible)
+        points = self.corrected(projection_px, observed_px, visible)
         surface = self._raster.map(points, depth)
         if surface is None:
             return image
@@ -98,28 +93,28 @@ class Compositor:
         crop = frame[surface.region]
         half = tuple(slice(s.start // 2, s.stop // 2) for s in surface.region)
         view = self._reference.view(crop, surface.uv, surface.cover)
-        free = view.inside * (1 - self._hidden[half])
+        free = view.inside * (1 - self._mask[half])
         gains = shading.exposure(view, free)
         view = shading.View(view.seen, view.predicted * gains, view.variance, view.inside)
         last = self._shade[half]
         corner = (surface.left, surface.top)
-        hidden, agreement = in_front(view, last, self._hidden[half], (points - corner - 0.5) / 2, visible)
-        shade = shading.shading(view, view.inside * (1 - hidden) * agreement, last)
-        self._hidden[:], self._shade[half] = 0, shade
-        self._hidden[half] = hidden
-        return self._blended(image, surface, picture, shade[..., None] * gains, hidden)
+        mask, agreement = occlusion_mask(view, last, self._mask[half], (points - corner - 0.5) / 2, visible)
+        shade = shading.shading(view, view.inside * (1 - mask) * agreement, last)
+        self._mask[:], self._shade[half] = 0, shade
+        self._mask[half] = mask
+        return self._blended(image, surface, picture, shade[..., None] * gains, mask)
 
     def first(self, picture: Image) -> Image:
         """The first frame with the picture on it, in its light."""
         image = self._first[: self._size[1], : self._size[0]]
-        if self._still is None:
+        if self._first_map is None:
             return image
-        h, w = self._still.cover.shape
+        h, w = self._first_map.cover.shape
         lit = np.ones((h // 2, w // 2, 3), np.float32)
-        return self._blended(image, self._still, picture, lit, np.zeros((h // 2, w // 2), np.uint8))
+        return self._blended(image, self._first_map, picture, lit, np.zeros((h // 2, w // 2), np.uint8))
 
-    def settled(self, projection_px: Array, observed_px: Array, visible: Flags) -> Array:
-        """The vertices (p, 2) where they are seen; the others as far off the shape as their neighbours."""
+    def corrected(self, projection_px: Array, observed_px: Array, visible: Flags) -> Array:
+        """The vertices (p, 2) where they are seen; others are moved off the shape as their neighbours are."""
         seen = np.where(visible, (observed_px - projection_px) @ np.array((1, 1j)), 0.0)
         off = seen
         for _ in range(ROUNDS):
@@ -127,21 +122,19 @@ class Compositor:
             off = around + visible / (1.0 + (np.abs(seen - around) / OUTLIER_PX) ** 2) * (seen - around)
         return np.asarray(projection_px + np.column_stack([off.real, off.imag]))
 
-    def _blended(
-        self, image: Image, surface: SurfaceMap, picture: Image, light: Floats, hidden: NDArray[np.uint8]
-    ) -> Image:
-        """The frame with the picture at the map's places, times the light (h / 2, w / 2, 3), but for what is hidden."""
+    def _blended(self, image: Image, surface: SurfaceMap, picture: Image, light: Floats, mask: Mask) -> Image:
+        """The frame with the picture at the map's places, times the light (h / 2, w / 2, 3), not where the mask is set."""
         h, w = surface.cover.shape
-        if self._levels is None or self._levels[0] is not picture:
-            self._levels = (picture, Levels(picture, self._place))
-        layer = self._levels[1].seen(surface.uv, surface.cover)
+        if self._pyramid is None or self._pyramid[0] is not picture:
+            self._pyramid = (picture, Pyramid(picture, self._place))
+        layer = self._pyramid[1].sampled(surface.uv, surface.cover)
         uv = shading.halved(surface.uv)
         white = shading.quadratic(uv[..., 0], uv[..., 1], self._first.shape) @ self._white / PAPER
         light = light * np.clip(white, 0.2, 1.2)[..., None].astype(np.float32)
         light = cast(Floats, cv2.resize(light, (w, h), interpolation=cv2.INTER_LINEAR))
-        behind = cv2.GaussianBlur(hidden.astype(np.float32), (0, 0), FEATHER_PX)
-        behind = cv2.resize(behind, (w, h), interpolation=cv2.INTER_LINEAR)
-        share = surface.cover * (1 - behind) * np.float32(self._opacity)
+        occluded = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), FEATHER_PX)
+        occluded = cv2.resize(occluded, (w, h), interpolation=cv2.INTER_LINEAR)
+        share = surface.cover * (1 - occluded) * np.float32(self._opacity)
         colour = cv2.multiply(cv2.cvtColor(layer, cv2.COLOR_BGRA2BGR), light, dtype=cv2.CV_32F)
         colour = cv2.multiply(colour, cv2.merge([share] * 3))
         rest = 1 - share * (layer[..., 3] * np.float32(1 / 255))
@@ -151,13 +144,13 @@ class Compositor:
         return out[: image.shape[0], : image.shape[1]]
 
 
-def painted(first: Image, reference_px: Array, model: Model, picture: Image, laid: Laid) -> Image:
+def painted(first: Image, reference_px: Array, model: Model, picture: Image, placement: Placement) -> Image:
     """The first frame with the picture on it.
 
     Raises:
         UsageError: it is not on the surface.
     """
-    compositor = Compositor(first, reference_px, model.mesh, perspective=model.camera.perspective, laid=laid)
+    compositor = Compositor(first, reference_px, model.mesh, perspective=model.camera.perspective, placement=placement)
     return compositor.first(picture)
 
 

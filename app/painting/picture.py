@@ -6,25 +6,23 @@ from typing import Self, cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Floats, Image
 from app.painting.shading import sampled
 from app.terminal.errors import UsageError
 from tracking import TrackingError
 from tracking.video import Frame, Video
 
-Image = NDArray[np.uint8]
-Floats = NDArray[np.float32]
 Box = tuple[int, int, int, int]
 
 STILLS = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff"))
-FINEST = 2.0  # texels kept per pixel of the first frame: enough for a surface that comes twice as near
-SHARPEN = 0.3  # levels: bilinear sampling bears this much minification
+FINEST = 2.0  # texels kept per pixel of the first frame: enough for a surface at half the distance
+SHARPEN = 0.3  # levels by which minification may exceed that of the level sampled
 SPREAD = 0.35  # new pixels, of the blur before shrinking
 STEP_PX = 4  # between the pixels whose minification is looked at
 
 
-class Artwork:
+class Texture:
     """A picture or a video to be put on a surface; a context manager.
 
     Args:
@@ -42,11 +40,11 @@ class Artwork:
         if self._video is None:
             self._picture = premultiplied(read_picture(path))
             return
-        self._begun_s = 0.0  # when the video began its present round
+        self._begun_s = 0.0  # when the video last started over
         self._rewind(self._video)
 
     def at(self, time_s: float) -> Image:
-        """What is to be seen at a time, which never goes back: (h, w, 4) BGR, premultiplied, and alpha."""
+        """The picture shown at a time, which never decreases: (h, w, 4) BGR, premultiplied, and alpha."""
         if self._video is None:
             return self._picture
         while self._begun_s + self._until_s() <= time_s:
@@ -60,7 +58,7 @@ class Artwork:
         return self._picture
 
     def _until_s(self) -> float:
-        """When, in its round, the picture shown has had its time."""
+        """Time in the present round until which the picture is shown."""
         if self._next is not None:
             return self._next.time_s
         assert self._video is not None
@@ -93,8 +91,8 @@ class Artwork:
             self._video.close()
 
 
-class Levels:
-    """A picture laid on the first frame, at every size it may be seen in.
+class Pyramid:
+    """An image pyramid (mipmap) of a picture that lies on the first frame.
 
     Args:
         picture: (h, w, 4) premultiplied.
@@ -112,19 +110,19 @@ class Levels:
             h, w = self._levels[-1].shape[:2]
             self._levels.append(shrunk(self._levels[-1], (max(1, w // 2), max(1, h // 2))))
 
-    def seen(self, uv: Floats, cover: Floats) -> Image:
+    def sampled(self, uv: Floats, cover: Floats) -> Image:
         """The picture (h, w, 4) where the places uv (h, w, 2) of the first frame are seen, as far as covered."""
         level = self._level(uv, cover)
         low, high = int(np.floor(level.min())), int(np.ceil(level.max()))
-        seen = self._sampled(low, uv)
+        seen = self._at_level(low, uv)
         if high > low:
             full = cv2.resize(level, cover.shape[::-1], interpolation=cv2.INTER_LINEAR)
         for k in range(low, high):
             share = np.clip(full - np.float32(k), 0.0, 1.0)
-            seen = cast(Image, cv2.blendLinear(seen, self._sampled(k + 1, uv), 1.0 - share, share))
+            seen = cast(Image, cv2.blendLinear(seen, self._at_level(k + 1, uv), 1.0 - share, share))
         return seen
 
-    def _sampled(self, level: int, uv: Floats) -> Image:
+    def _at_level(self, level: int, uv: Floats) -> Image:
         picture = self._levels[level]
         h, w = picture.shape[:2]
         x, y, wide, tall = self._place
@@ -148,7 +146,7 @@ class Levels:
 
 
 def shrunk(picture: Image, size: tuple[int, int]) -> Image:
-    """The picture in a smaller size (width, height); areas alone would leave a beat of fine stripes."""
+    """The picture in a smaller size (width, height); averaging areas alone would alias fine stripes."""
     factors = (picture.shape[1] / size[0], picture.shape[0] / size[1])
     spread = [SPREAD * factor if factor > 1 else 1e-3 for factor in factors]
     smooth = cv2.GaussianBlur(picture, (0, 0), sigmaX=spread[0], sigmaY=spread[1])
@@ -161,8 +159,8 @@ def first_picture(path: Path) -> Image:
     Raises:
         UsageError: it cannot be read.
     """
-    with Artwork(path) as artwork:
-        return artwork.at(0.0)
+    with Texture(path) as texture:
+        return texture.at(0.0)
 
 
 def read_picture(path: Path) -> Image:
@@ -188,7 +186,7 @@ def read_picture(path: Path) -> Image:
 
 
 def premultiplied(picture: Image) -> Image:
-    """A picture as (h, w, 4): colours multiplied by alpha, so that filtering does not bring hidden colours forth."""
+    """A picture as (h, w, 4): colours multiplied by alpha, so that filtering mixes in no transparent pixels."""
     if picture.shape[2] == 3:
         return cast(Image, cv2.cvtColor(picture, cv2.COLOR_BGR2BGRA))
     alpha = picture[..., 3]

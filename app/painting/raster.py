@@ -10,10 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Floats = NDArray[np.float32]
-Indices = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from app.arrays import Array, Flags, Floats, Indices
+
 Places = NDArray[np.complex64]  # u + iv: NumPy moves one complex number faster than two real ones
 
 MARGIN_PX = 2
@@ -101,7 +99,7 @@ class Rasteriser:
         if not front.all():
             kept = np.flatnonzero(front[runs.face[span]])
             span, step, pixel = span[kept], step[kept], pixel[kept]
-        begin, end = self._places(runs, points, weight)
+        begin, end = self._coordinates(runs, points, weight)
         uv, inside = np.zeros(h * w, np.complex64), np.zeros(h * w, np.uint8)
         # Exact at both ends of a span, and spans are short: in between a straight line will do.
         uv[pixel] = begin[span] + ((end - begin) / np.maximum(runs.count - 1, 1)).astype(np.complex64)[span] * step
@@ -109,7 +107,7 @@ class Rasteriser:
         cover = self._smooth_edge(points, front, uv, inside.reshape(h, w))
         return SurfaceMap(int(low[0]), int(low[1]), uv.view(np.float32).reshape(h, w, 2), cover)
 
-    def _places(self, runs: Spans, points: Array, weight: Array) -> tuple[Places, Places]:
+    def _coordinates(self, runs: Spans, points: Array, weight: Array) -> tuple[Places, Places]:
         """First-frame places u + iv (s,) of the first and the last pixels of spans."""
         planes = plane_coefficients(points, self._faces, np.column_stack([self._reference * weight[:, None], weight]))
         planes = planes[runs.face]
@@ -119,7 +117,7 @@ class Rasteriser:
         return begin.astype(np.complex64), end.astype(np.complex64)
 
     def _front(self, points: Array) -> Flags:
-        """Which triangles (m,) show their front; a sliver that noise turns over is outvoted by its neighbours."""
+        """Which triangles (m,) show their front; decided with their neighbours, since noise turns slivers over."""
         areas = np.repeat(doubled_areas(points, self._faces), 3)
         around = np.bincount(self._faces.ravel(), areas, minlength=len(points))
         a, b, c = self._faces.T
@@ -146,7 +144,7 @@ class Rasteriser:
         share = np.clip(place.real, 0, 1)
         distance = np.abs(place - share) * np.abs(along)[segment]
         near = np.flatnonzero(distance < 0.5)
-        # Where the outline lies before another part of the surface, that part shows through: nothing to soften.
+        # Where the outline lies in front of another part of the surface, there is no background to blend with.
         edge = (cv2.erode(inside, NEIGHBOURS) == 0) & (cv2.dilate(inside, NEIGHBOURS) > 0)
         near = near[edge[row[near], column[near]]]
         near = near[np.argsort(-distance[near], kind="stable")]  # of several assignments, the last and nearest stays
@@ -216,13 +214,13 @@ def pixels_of_spans(runs: Spans, width: int) -> tuple[Indices, Indices, Indices]
 def frontmost(pixel: Indices, faces: Indices, points: Array, nearness: Array, face: Indices, width: int) -> Indices:
     """Which of (n,) pixels of triangles, numbered `face` (n,), are not behind another triangle's."""
     several = np.bincount(pixel)[pixel] > 1
-    rivals = np.flatnonzero(several)
-    plane = plane_coefficients(points, faces, nearness[:, None])[face[rivals], 0]
-    place = pixel[rivals]
+    overlapping = np.flatnonzero(several)
+    plane = plane_coefficients(points, faces, nearness[:, None])[face[overlapping], 0]
+    place = pixel[overlapping]
     near = plane[:, 0] * (place % width) + plane[:, 1] * (place // width) + plane[:, 2]
     order = np.lexsort((near, place))
     nearest = np.append(place[order][1:] != place[order][:-1], True)
-    return np.concatenate([np.flatnonzero(~several), rivals[order[nearest]]])
+    return np.concatenate([np.flatnonzero(~several), overlapping[order[nearest]]])
 
 
 def plane_coefficients(points: Array, faces: Indices, values: Array) -> Array:

@@ -1,4 +1,4 @@
-"""How the light on a surface has changed since the first frame, and what does not belong to the surface.
+"""Shading: how the light on a surface has changed since the first frame.
 
 All at half the picture's resolution. The first frame, seen where the surface is now, predicts the picture under
 the first frame's light. Their ratio is the change of shading. Displayed values are powers of light: a ratio of
@@ -12,14 +12,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float32]
-Image = NDArray[np.uint8]
-Pixels = TypeVar("Pixels", NDArray[np.uint8], NDArray[np.float32])
+from app.arrays import Array, Floats, Image
+
+Pixels = TypeVar("Pixels", NDArray[np.uint8], Floats)
 
 NOISE = 5.0  # grey levels, of the camera and its compression
 MISPLACED = 0.3  # half-resolution px: how far the map may be off
 FINE_PX = 2.0  # half-resolution px: folds of this width keep their shading
-COARSE = 4  # where that is not enough to see the shading by, a grid coarser by this factor helps out
+COARSE = 4  # factor of the coarser grid that is used where the fine one has too little texture
 COARSE_PX = 3.0
 TRUST = 0.1  # of the coarse estimate against the fine one
 INERTIA = 0.02  # of the last frame's shading against the coarse one
@@ -79,7 +79,7 @@ def halved(picture: NDArray[np.uint8] | Floats) -> Floats:
 
 
 def exposure(view: View, weight: Floats) -> Floats:
-    """How much brighter each channel (3,) is than predicted, relative to all together: the light's change of colour."""
+    """Gain of each channel (3,) against the prediction, relative to their mean: the light's change of colour."""
     both = np.einsum("hw,hwc,hwc->c", weight, view.seen, view.predicted)
     one = np.einsum("hw,hwc,hwc->c", weight, view.predicted, view.predicted)
     gains = (both + 1.0) / (one + 1.0)
@@ -89,7 +89,7 @@ def exposure(view: View, weight: Floats) -> Floats:
 def shading(view: View, weight: Floats, last: Floats) -> Floats:
     """The ratio of seen to predicted brightness (h, w), smooth but for folds, where `weight` says that it can be seen.
 
-    A least squares fit around every pixel, at two scales; where nothing is seen, `last` (h, w) holds on.
+    A least squares fit around every pixel, at two scales; where nothing is seen, `last` (h, w) is kept.
     """
     weight = weight / view.variance
     both = weight * np.einsum("hwc,hwc->hw", view.seen, view.predicted)
@@ -107,7 +107,7 @@ def shading(view: View, weight: Floats, last: Floats) -> Floats:
     return cast(Floats, np.clip(ratio, DARKEST, BRIGHTEST))
 
 
-def white_level(image: Image, inside: NDArray[np.uint8]) -> NDArray[np.float64]:
+def white_level(image: Image, inside: NDArray[np.uint8]) -> Array:
     """How bright white would be on the surface in the first frame: coefficients (6,) of a quadratic over the picture.
 
     Fitted from above to the brightness where `inside`: what is printed is darker than the paper.
@@ -128,7 +128,7 @@ def white_level(image: Image, inside: NDArray[np.uint8]) -> NDArray[np.float64]:
     return fit
 
 
-def quadratic(u: NDArray[np.floating], v: NDArray[np.floating], shape: tuple[int, ...]) -> NDArray[np.float64]:
+def quadratic(u: NDArray[np.floating], v: NDArray[np.floating], shape: tuple[int, ...]) -> Array:
     """1, u, v, u², uv, v² (n, 6) of px in a picture of that shape."""
     a, b = u / shape[1] - 0.5, v / shape[0] - 0.5
     return np.stack([np.ones_like(a), a, b, a * a, a * b, b * b], axis=-1)

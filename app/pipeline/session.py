@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from app.files.writing import check_free
 from app.options.run import Run, Words, as_words
-from app.painting.compositing import Laid, painted
+from app.painting.compositing import Placement, painted
 from app.painting.picture import first_picture
 from app.pipeline.behind import Behind
 from app.pipeline.counts import Tally
@@ -222,8 +222,8 @@ class Session:
             self._progress.say(note)
         first = take.first.image
         if self._picture is not None and take.config.texture:
-            laid = Laid(self._config.place, self._config.opacity)
-            first = painted(first, take.points_px, model, self._picture, laid)
+            placement = Placement(self._config.place, self._config.opacity)
+            first = painted(first, take.points_px, model, self._picture, placement)
         self._recording.model(model, first, take.points_px, reconstruction.metric)
         if self._observer:
             self._observer.begin(take.first, take.points_px, model, self._fps)

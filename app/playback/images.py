@@ -7,15 +7,13 @@ from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Image
 from app.playback.chunks import RecordingFile, column_rows
 from app.recording import entities
 from app.terminal.errors import UsageError
 from tracking import TrackingError
 from tracking.video import Video
-
-Image = NDArray[np.uint8]
 
 JPEG = "EncodedImage:blob"
 JPEG_TYPE = "EncodedImage:media_type"

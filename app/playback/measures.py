@@ -6,12 +6,10 @@ from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array, Indices
 from app.options.run import Words
 from app.playback.playback import Playback
-
-Array = NDArray[np.float64]
 
 WORST_FRAMES = 5
 WORST_APART = 5  # frames: neighbours of a bad frame are bad for the same reason
@@ -34,8 +32,8 @@ class Measures:
 
     residual_px: Array
     visible_share: Array
-    lost: NDArray[np.int64]
-    recovered: NDArray[np.int64]
+    lost: Indices
+    recovered: Indices
     total_ms: Array
 
     def errors(self, percentile: float) -> Array:
@@ -161,7 +159,7 @@ def phase_ranges(playback: Playback) -> list[tuple[str, int, int]]:
     return ranges
 
 
-def worst_frames(frames: NDArray[np.int64], times_s: Array, rms_px: Array) -> list[dict[str, float]]:
+def worst_frames(frames: Indices, times_s: Array, rms_px: Array) -> list[dict[str, float]]:
     """The frames with the largest RMS error, worst first, none next to another."""
     chosen: list[int] = []
     for i in np.argsort(-np.nan_to_num(rms_px, nan=-1.0), kind="stable").tolist():

@@ -4,17 +4,14 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array, Image, Indices
 from app.playback.chunks import Rows
 from app.recording import entities
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera
 from reconstruction.window.model import Model
-
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 MODEL = "modeshape.Model:"
 TEXTURE = "Mesh3D:albedo_texture_"
@@ -36,7 +33,7 @@ class Modelled:
     size: tuple[int, int]
     texture_px: Array
     texture_bgr: Image
-    texture_origin: NDArray[np.int64]
+    texture_origin: Indices
 
 
 def modelled_part(rows: Rows) -> Modelled | None:

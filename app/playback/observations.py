@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array, Flags, Indices
 from app.playback.chunks import Rows
 from app.recording import entities
-
-Array = NDArray[np.float64]
 
 OBSERVATION = "modeshape.Observation:"
 POSITIONS = "Points2D:positions"
@@ -27,11 +25,11 @@ class Observed:
         visible: (F, P) whether a point was seen.
     """
 
-    frames: NDArray[np.int64]
+    frames: Indices
     times_s: Array
     phases: list[str]
     W: Array
-    visible: NDArray[np.bool_]
+    visible: Flags
 
 
 def observed_part(rows: Rows) -> Observed | None:
@@ -46,7 +44,7 @@ def observed_part(rows: Rows) -> Observed | None:
     numbers = sorted(observed.keys() & seen.keys() & phases.keys())  # what was cut off may have one without another
     if not numbers:
         return None
-    visible = np.stack([cast(NDArray[np.bool_], observed[k].value) for k in numbers])
+    visible = np.stack([cast(Flags, observed[k].value) for k in numbers])
     points = np.full((*visible.shape, 2), np.nan)
     positions = np.concatenate([cast(Array, seen[k].value) for k in numbers])
     if len(positions) != visible.sum():

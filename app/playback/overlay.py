@@ -7,12 +7,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import Array, Image
 from app.playback.playback import Playback
 from app.recording.styles import LOST_RGB, PREDICTED_RGB, SEEN_RGB
 from app.terminal.errors import UsageError
 
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
 Color = tuple[int, int, int]
 
 TRAIL_FRAMES = 8

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Self, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array, Flags, Image, Indices
 from app.playback.chunks import RecordingFile
 from app.playback.documents import DOCUMENT, NAME, SCALARS, document, events, recording_name, stages
 from app.playback.images import stored_images
@@ -24,9 +24,6 @@ from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.state import State
 from reconstruction.window.model import Model, ShapeEstimate
-
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 ESTIMATE = "modeshape.Estimate:"
 
@@ -62,13 +59,13 @@ class Playback:
     configuration: dict[str, object]
     summary: dict[str, object] | None
     notes: tuple[str, ...]
-    frames: NDArray[np.int64]
+    frames: Indices
     times_s: Array
     phases: list[str]
     stage_ms: dict[str, Array]
     events: list[tuple[int, float, str, str]]
     W: Array
-    visible: NDArray[np.bool_]
+    visible: Flags
     quaternion: Array
     t: Array
     s: Array
@@ -180,12 +177,12 @@ class Playback:
         return self._need().texture_bgr
 
     @property
-    def texture_origin(self) -> NDArray[np.int64]:
+    def texture_origin(self) -> Indices:
         """Where (2,) px that part is in the first frame."""
         return self._need().texture_origin
 
     @cached_property
-    def shaped(self) -> NDArray[np.bool_]:
+    def shaped(self) -> Flags:
         """Which frames (F,) have a shape."""
         return np.asarray(np.isfinite(self.s))
 

@@ -6,17 +6,15 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array, Indices
 from app.playback.playback import Playback
 from reconstruction.camera import rotation_from_quaternion
-
-Array = NDArray[np.float64]
 
 ROWS = ("alpha", "beta", "tau")
 
 
-def camera_path(playback: Playback, rows: NDArray[np.int64]) -> tuple[Array, Array]:
+def camera_path(playback: Playback, rows: Indices) -> tuple[Array, Array]:
     """The camera as the object sees it, in the axes of the rest shape: rotations (n, 3, 3) and positions (n, 3) px.
 
     A rotation's columns are the camera's x (right), y (down) and z (forward). An orthographic camera has no

@@ -16,7 +16,7 @@ from app.files.video_out import PacedVideo, VideoSink
 from app.options.retexture import Retexture
 from app.options.run import Output, Run
 from app.painting.compositing import Compositor, bounding_box
-from app.painting.picture import Artwork, premultiplied
+from app.painting.picture import Texture, premultiplied
 from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
@@ -203,8 +203,8 @@ def test_a_video_moves_on_the_surface_and_begins_again(tmp_path: Path) -> None:
     with VideoSink(path, (64, 48), 10.0) as sink:
         for level in (40, 90, 140, 190):
             sink.write(np.full((48, 64, 3), level, np.uint8))
-    with Artwork(path) as artwork:
-        shown = [artwork.at(t)[..., :3].copy() for t in (0.0, 0.05, 0.1, 0.25, 0.39, 0.4, 0.75, 0.81, 4.35)]
+    with Texture(path) as texture:
+        shown = [texture.at(t)[..., :3].copy() for t in (0.0, 0.05, 0.1, 0.25, 0.39, 0.4, 0.75, 0.81, 4.35)]
     frames = frames_of(path)  # as compressed: the grey levels are off by a few
     assert len(frames) == 4
     for picture_, k in zip(shown, (0, 0, 1, 2, 3, 0, 3, 0, 3), strict=True):
@@ -229,8 +229,8 @@ def test_the_picture_s_own_size_and_alpha_are_read(tmp_path: Path) -> None:
         ("clear", np.dstack([np.full((9, 7, 3), 200, np.uint8), np.full((9, 7), 128, np.uint8)])),
     ):
         cv2.imwrite(str(tmp_path / f"{name}.png"), picture_)
-        with Artwork(tmp_path / f"{name}.png") as artwork:
-            read = artwork.at(0.0)
+        with Texture(tmp_path / f"{name}.png") as texture:
+            read = texture.at(0.0)
         assert read.shape == (9, 7, 4)
         assert np.abs(read[..., 0].astype(int) - 100).max() <= 1
         assert read[0, 0, 3] == (128 if name == "clear" else 255)

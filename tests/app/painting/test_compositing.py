@@ -6,7 +6,7 @@ import pytest
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from app.painting.compositing import Compositor, Laid, even
+from app.painting.compositing import Compositor, Placement, even
 from app.painting.picture import premultiplied
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh, triangulate
@@ -46,8 +46,8 @@ SCENE = scene()
 GREY = premultiplied(np.full((50, 80, 3), (200, 120, 90), np.uint8))
 
 
-def compositor(laid: Laid | None = None) -> Compositor:
-    return Compositor(SCENE, POINTS, MESH, perspective=True, laid=laid)
+def compositor(placement: Placement | None = None) -> Compositor:
+    return Compositor(SCENE, POINTS, MESH, perspective=True, placement=placement)
 
 
 def paint(work: Compositor, image: Image, picture: Image = GREY, observed: NDArray[np.float64] = POINTS) -> Image:
@@ -83,20 +83,20 @@ def test_pictures_of_odd_sizes(crop: tuple[int, int]) -> None:
 def test_what_is_transparent_changes_nothing() -> None:
     clear = premultiplied(np.dstack([np.full((20, 20, 3), 255, np.uint8), np.zeros((20, 20), np.uint8)]))
     assert np.array_equal(paint(compositor(), SCENE, clear), SCENE)
-    assert np.array_equal(paint(compositor(Laid(opacity=0.0)), SCENE), SCENE)
+    assert np.array_equal(paint(compositor(Placement(opacity=0.0)), SCENE), SCENE)
 
 
 def test_opacity_and_alpha_are_shares() -> None:
     full = paint(compositor(), SCENE)[inner()].astype(float)
     bare = SCENE[inner()].astype(float)
     half = premultiplied(np.dstack([np.full((50, 80, 3), (200, 120, 90), np.uint8), np.full((50, 80), 128, np.uint8)]))
-    for seen in (paint(compositor(Laid(opacity=0.5)), SCENE), paint(compositor(), SCENE, half)):
+    for seen in (paint(compositor(Placement(opacity=0.5)), SCENE), paint(compositor(), SCENE, half)):
         assert np.abs(seen[inner()] - 0.5 * (full + bare)).max() < 2.5
 
 
 def test_the_picture_lies_where_it_is_placed() -> None:
     place = (100, 80, 60, 40)
-    painted = paint(compositor(Laid(place)), SCENE)
+    painted = paint(compositor(Placement(place)), SCENE)
     changed = (painted != SCENE).any(axis=-1)
     rows, columns = np.nonzero(changed)
     assert np.abs(np.array((columns.min(), rows.min())) - (100, 80)).max() <= 1  # the edge is smooth
@@ -107,7 +107,7 @@ def test_the_picture_lies_where_it_is_placed() -> None:
 @pytest.mark.parametrize("place", [(0, 0, 40, 40), (300, 200, 500, 500), (-90, 60, 80, 80)])
 def test_a_place_off_the_surface_is_refused(place: tuple[int, int, int, int]) -> None:
     with pytest.raises(UsageError, match=r"--place .* is not on the surface, which is between 60 and 259 across"):
-        compositor(Laid(place))
+        compositor(Placement(place))
 
 
 @pytest.mark.parametrize("across", [True, False])
@@ -184,11 +184,11 @@ def test_points_that_are_seen_carry_the_surface() -> None:
     work = compositor()
     seen = POINTS + np.array((1.5, -1.0))
     some = np.random.default_rng(0).random(len(POINTS)) < 0.6
-    settled = work.settled(POINTS, np.where(some[:, None], seen, np.nan), some)
+    settled = work.corrected(POINTS, np.where(some[:, None], seen, np.nan), some)
     assert np.abs(settled - seen).max() < 0.1
     wild = seen.copy()
     wild[70] += 30
-    settled = work.settled(POINTS, wild, np.ones(len(POINTS), bool))
+    settled = work.corrected(POINTS, wild, np.ones(len(POINTS), bool))
     assert np.linalg.norm(settled[70] - seen[70]) < 1
 
 
