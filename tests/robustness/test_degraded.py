@@ -25,8 +25,8 @@ KINECT_ROI = (195, 95, 325, 265)
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Sample:
-    return sample(tmp_path_factory.mktemp("sample"))
+def made() -> Sample:
+    return sample()
 
 
 @pytest.fixture(scope="module")
@@ -45,9 +45,8 @@ def test_a_cut_is_noticed_and_the_sheet_found_again(shared_data: Path, tmp_path:
     assert result.error(range(136, 191)) <= 1.5 * result.error(range(136))
 
 
-@pytest.mark.parametrize(
-    ("where", "factor"), [("disc", 1.5), ("band", 1.5), pytest.param("side", 2.5, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("where", "factor"), [("disc", 1.5), ("band", 1.5), ("side", 2.5)])
 def test_an_occluder_costs_little(made: Sample, clean: Result, tmp_path: Path, where: str, factor: float) -> None:
     # Over one side, the hidden part has a free end and bends out of sight: what it does is not to be known.
     video = write(tmp_path / "occluded.avi", changed(made.video, occluded(made.truth, where)), SIZE)

@@ -119,6 +119,7 @@ def test_a_printed_sheet_is_followed(
     verify(here / "paper.rrd")
 
 
+@pytest.mark.slow
 def test_a_talking_face_is_followed(modeshape: Command, shared_data: Path, here: Path) -> None:
     outcome = modeshape(
         "run", shared_data / "talking_face.mp4", "--roi", 115, 70, 130, 160, "--frames", "0:600", "--json",

@@ -3,8 +3,6 @@
 import csv
 import json
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
@@ -25,6 +23,7 @@ from app.recording.styles import PREDICTED_RGB, SEEN_RGB
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from reconstruction.camera import Camera
+from tests.app.command_line import Command
 from tests.app.glb_file import GlbFile, issues
 from tests.synthetic_run import SIZE, Run, write_run
 
@@ -308,16 +307,11 @@ def test_the_ending_tells_the_format() -> None:
     assert Export(Path("sheet.rrd"), format="obj", out=Path("x.y")).kind == "obj"
 
 
-def modeshape(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    script = Path(sys.executable).with_name("modeshape")
-    return subprocess.run([script, *map(str, words)], capture_output=True, text=True, timeout=120)
-
-
-def test_the_command_line(tmp_path: Path, run: Run) -> None:
+def test_the_command_line(modeshape: Command, tmp_path: Path, run: Run) -> None:
     recording = shutil.copy(run.path, tmp_path)
     done = modeshape("export", recording, "--format", "glb", "--json")
-    assert done.returncode == 0, done.stderr
-    words = json.loads(done.stdout)
+    assert done.code == 0, done.err
+    words = json.loads(done.out)
     assert (words["out"], words["points"]) == (str(tmp_path / "sheet.glb"), len(run.pixels))
     assert (tmp_path / "sheet.glb").is_file()
 
@@ -328,13 +322,13 @@ def test_the_command_line(tmp_path: Path, run: Run) -> None:
     ids=["paper", "face", "demo"],
 )
 def test_a_real_run_agrees_with_its_own_shapes(
-    tmp_path: Path, request: pytest.FixtureRequest, video: str | None, roi: tuple[int, ...] | None
+    modeshape: Command, tmp_path: Path, request: pytest.FixtureRequest, video: str | None, roi: tuple[int, ...] | None
 ) -> None:
     recording, shapes = tmp_path / "real.rrd", tmp_path / "shapes.npz"
     source = demo.sample().video if video is None else request.getfixturevalue("shared_data") / video
     options = ("--roi", *map(str, roi or demo.sample().roi), "--frames", "0:30", "--points", "200")
     done = modeshape("run", source, *options, "--out", recording, "--shapes-out", shapes)
-    assert done.returncode == 0, done.stderr
+    assert done.code == 0, done.err
     with np.load(shapes) as stored:
         truth = dict(stored)
     with np.load(words_out(recording, "npz")) as stored:
@@ -363,11 +357,13 @@ def words_out(recording: Path, kind: str, **options: object) -> Path:
         (["sheet.rrd"], "--format"),
     ],
 )
-def test_mistakes_are_told_in_one_line(tmp_path: Path, run: Run, words: list[str], complaint: str) -> None:
+def test_mistakes_are_told_in_one_line(
+    modeshape: Command, tmp_path: Path, run: Run, words: list[str], complaint: str
+) -> None:
     (tmp_path / "notes.txt").write_text("no recording")
     shutil.copy(run.path, tmp_path / "sheet.rrd")
     done = modeshape("export", tmp_path / words[0], *words[1:])
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("error: ")
-    assert done.stderr.count("\n") == 1
-    assert complaint in done.stderr
+    assert (done.code, done.out) == (2, "")
+    assert done.err.startswith("error: ")
+    assert done.err.count("\n") == 1
+    assert complaint in done.err

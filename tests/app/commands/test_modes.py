@@ -1,8 +1,6 @@
 """The figure of the mode shapes: drawn from recordings and tracks, and recorded with a run."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import cv2
@@ -23,6 +21,7 @@ from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modes import ModalBasis, modal_basis
+from tests.app.command_line import Command
 from tests.synthetic_run import MODES, Run, write_run
 from tracking.tracks import Tracks
 
@@ -156,11 +155,6 @@ def test_the_rim_is_a_closed_line(run: Run) -> None:
     assert (np.bincount(rim.ravel())[np.unique(rim)] == 2).all()
 
 
-def modeshape(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    script = Path(sys.executable).with_name("modeshape")
-    return subprocess.run([script, *map(str, words)], capture_output=True, text=True, timeout=120)
-
-
 def test_a_run_records_the_figure(tmp_path: Path, shared_data: Path) -> None:
     out, paper = tmp_path / "paper.rrd", shared_data / "kinect_paper.mp4"
     run = Asked(str(paper), roi=(195, 95, 325, 265), frames="0:12", points=150, output=Output(out=out))
@@ -171,10 +165,10 @@ def test_a_run_records_the_figure(tmp_path: Path, shared_data: Path) -> None:
     assert 0.05 < colorful(picture(bytes(blob))) < 0.6
 
 
-def test_the_command_line(tmp_path: Path, run: Run) -> None:
+def test_the_command_line(modeshape: Command, tmp_path: Path, run: Run) -> None:
     done = modeshape("modes", run.path, "--out", tmp_path / "modes.png", "--json")
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["points"] == run.basis.rest.shape[1]
+    assert done.code == 0, done.err
+    assert json.loads(done.out)["points"] == run.basis.rest.shape[1]
     assert (tmp_path / "modes.png").is_file()
 
 
@@ -193,7 +187,7 @@ def test_the_command_line(tmp_path: Path, run: Run) -> None:
     ],
 )
 def test_mistakes_are_told_in_one_line(
-    tmp_path: Path, tracks: Path, words: list[str], complaint: str, monkeypatch: pytest.MonkeyPatch
+    modeshape: Command, tmp_path: Path, tracks: Path, words: list[str], complaint: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert tracks.parent == tmp_path
     monkeypatch.chdir(tmp_path)
@@ -202,8 +196,8 @@ def test_mistakes_are_told_in_one_line(
     np.savez("foreign.npz", x=np.zeros(3))
     write_run(Path("early.rrd"), frames=3, first_shape=9)
     done = modeshape("modes", *words)
-    assert (done.returncode, done.stdout) == (2, ""), done.stderr
-    last = done.stderr.strip().splitlines()[-1]
+    assert (done.code, done.out) == (2, ""), done.err
+    last = done.err.strip().splitlines()[-1]
     assert last.startswith("error: ")
     assert complaint in last
     assert not Path("modes.png").exists()

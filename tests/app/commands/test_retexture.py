@@ -78,6 +78,7 @@ def decibels(squared: float) -> float:
     return float(10 * np.log10(255**2 / squared))
 
 
+@pytest.mark.slow
 def test_the_demo_is_retextured_as_if_it_were_printed(recording: Path) -> None:
     """The composite at the true places of the sheet's points, against the card's colours there times the true light.
 

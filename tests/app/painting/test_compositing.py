@@ -1,15 +1,12 @@
-from time import thread_time
-
 import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
 
 from app.painting.compositing import Compositor, Placement, even
 from app.painting.picture import premultiplied
 from app.terminal.errors import UsageError
-from reconstruction.basis.mesh import Mesh, triangulate
+from reconstruction.basis.mesh import triangulate
 
 Image = NDArray[np.uint8]
 SIZE = (320, 240)
@@ -202,25 +199,3 @@ def test_the_first_frame_is_painted_in_its_own_light() -> None:
     assert np.array_equal(painted[:40], lit[:40])
     left, right = painted[80:160, 75:95].mean(), painted[80:160, 225:245].mean()
     assert left / right == pytest.approx((0.6 + 0.4 * 85 / 319) / (0.6 + 0.4 * 235 / 319), abs=0.05)
-
-
-def test_sixty_frames_a_second() -> None:
-    rng = np.random.default_rng(0)
-    points = np.stack(np.meshgrid(np.linspace(155, 480, 32), np.linspace(110, 370, 25)), axis=-1).reshape(-1, 2)
-    points = points + rng.uniform(-3, 3, points.shape)
-    mesh: Mesh = triangulate(points)
-    image = cv2.resize(SCENE, (640, 480))
-    work = Compositor(np.asarray(image, np.uint8), points, mesh, perspective=True)
-    picture = premultiplied(rng.integers(0, 255, (900, 1200, 3), np.uint8))
-    depth = 600 + 40 * np.sin(points[:, 0] / 50)
-    threads, fastest = cv2.getNumThreads(), np.inf
-    cv2.setNumThreads(1)
-    try:
-        with threadpool_limits(1):
-            for _ in range(60):  # time of one core: a busy machine is no reason to fail
-                started = thread_time()
-                work.paint(np.asarray(image, np.uint8), picture, points, depth, points)
-                fastest = min(fastest, thread_time() - started)
-    finally:
-        cv2.setNumThreads(threads)
-    assert fastest < 1 / 60

@@ -2,7 +2,6 @@
 
 import socket
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -44,7 +43,5 @@ def test_one_that_does_not_start_is_told(program: Path, text: str | None) -> Non
     if text is not None:
         program.write_text(text)
         program.chmod(0o755)
-    began = time.monotonic()
     with pytest.raises(UsageError, match="--view: the viewer does not start"):
         viewer.spawned_viewer()
-    assert time.monotonic() - began < 10
