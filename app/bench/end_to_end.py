@@ -44,6 +44,8 @@ class WholeRun:
     median_ms: float
     p95_ms: float
     peak_mb: float
+    unwritten_s: float
+    """Longest time between two frames after which the file of the recording had grown."""
 
 
 def whole_runs(*, quick: bool, say: Say) -> Iterator[WholeRun]:
@@ -78,6 +80,7 @@ def whole_run(name: str, video: Path, roi: tuple[int, int, int, int], points: in
         median_ms=float(np.median(each_ms)),
         p95_ms=float(np.percentile(each_ms, 95)),
         peak_mb=words["peak_mb"],
+        unwritten_s=words["unwritten_s"],
     )
 
 
@@ -152,6 +155,7 @@ def ratios(runs: list[WholeRun], help_seconds: float, many: tuple[int, float] | 
             f"fps_{name}": (run.frames - 1) / run.loop_s,
             f"p95_over_median_{name}": run.p95_ms / run.median_ms,
             f"peak_mb_{name}": run.peak_mb,
+            f"unwritten_s_{name}": run.unwritten_s,
         }
     first = min(run.first_frame_s for run in runs if run.points == min(POINTS))
     if many is not None:

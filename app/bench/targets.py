@@ -45,6 +45,9 @@ TARGETS = (
     Target("fps_demo_800", "the same, demo", 60, at_least=True, unit=""),
     Target("p95_over_median_kinect_paper_800", "Frame times, kinect_paper: 95th percentile over median", 2),
     Target("p95_over_median_demo_800", "the same, demo", 2),
+    Target("unwritten_s_kinect_paper_800", "Longest that nothing of it is written, kinect_paper", 2, unit="s"),
+    Target("unwritten_s_demo_800", "the same, demo", 2, unit="s"),
+    Target("paint_ms", "Painting a picture on 800 points, 640×480, one core", 1000 / 60, unit="ms"),
     Target("help_s", "modeshape --help", 0.3, unit="s"),
     Target("first_frame_s", "First frame done after the command", 2.5, unit="s"),
 )

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
-from app.bench import basis, end_to_end, window
+from app.bench import basis, end_to_end, painting, window
 from app.bench.targets import Ratios, markdown, rows
 from app.files.readme import put_table, with_table
 from app.files.writing import check_free, writable
@@ -38,8 +38,10 @@ def bench(command: Bench, progress: Progress) -> Words:
         angles = {metric: basis.angle_degrees(metric, say) for metric in basis.METRICS}
         runs = list(end_to_end.whole_runs(quick=quick, say=say))
         help_s = end_to_end.help_s(say)
+        paint_ms = painting.paint_ms(say)
         many = None if quick else end_to_end.many_points(say)
-    ratios = window.ratios(timings, races) | basis.ratios(basis_times, angles) | end_to_end.ratios(runs, help_s, many)
+    ratios = window.ratios(timings, races) | basis.ratios(basis_times, angles)
+    ratios |= end_to_end.ratios(runs, help_s, many) | {"paint_ms": paint_ms}
     if command.plot:
         from app.bench.plot import draw
 

@@ -26,7 +26,7 @@ def test_what_is_measured_can_be_printed(capsys: pytest.CaptureFixture[str]) -> 
     from app.bench.end_to_end import WholeRun
     from app.commands.bench import print_tables
 
-    run = WholeRun("demo", 800, 100, 2.0, 3.0, 3.5, 2.5, 10.0, 12.0, 300.0)
+    run = WholeRun("demo", 800, 100, 2.0, 3.0, 3.5, 2.5, 10.0, 12.0, 300.0, 0.5)
     words = {
         "window": [asdict(window.Timing(828, 30, "general", 0.1, 0.1, 1.0, 3, 4.0))],
         "rivals": [asdict(window.Race(828, 30, "general", 4.0, 400.0, None))],
