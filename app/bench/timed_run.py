@@ -35,12 +35,12 @@ def main() -> None:
             super().advance(phase, error_px)
 
     clock = Clock()
-    words = Session(command, clock).run()
+    summary = Session(command, clock).run()
     told = {
         "stamps": clock.stamps,
         "complete": time(),
         "peak_mb": peak_mb(),
-        "points": words["points"],
+        "points": summary.points,
         "unwritten_s": max((b - a for a, b in pairwise(clock.grown.values())), default=0.0),
     }
     sys.stdout.write(json.dumps(told) + "\n")

@@ -123,7 +123,7 @@ def run(command: Run | Evaluate | Demo | Review | Retexture | Export | Modes | B
     else:
         from app.pipeline.session import Session
 
-        words, printed_as_json = Session(command, Progress()).run(), command.output.json
+        words, printed_as_json = Session(command, Progress()).run().as_dict(), command.output.json
     if printed_as_json:
         as_json(words)
     else:

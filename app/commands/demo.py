@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from app.demo import sample
+from app.files.names import RECORDINGS
 from app.options.run import Demo, Output, Run, Words
-from app.pipeline.parts import RECORDINGS
 from app.pipeline.session import Session
 from app.terminal.progress import Progress
 
@@ -23,4 +23,4 @@ def demo(config: Demo) -> Words:
     progress = Progress()
     if path.exists():
         progress.say(f"replacing {path}")
-    return Session(run, progress).run()
+    return Session(run, progress).run().as_dict()

@@ -1,5 +1,6 @@
 """`modeshape retexture`: a picture on the moving surface, from a recording or live while a video is tracked."""
 
+from contextlib import closing
 from pathlib import Path
 from time import perf_counter
 from types import TracebackType
@@ -16,6 +17,7 @@ from app.options.retexture import Retexture
 from app.options.run import Words, parse_range
 from app.painting.compositing import Compositor, Placement
 from app.painting.picture import Texture
+from app.pipeline.interrupts import completed
 from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
@@ -43,10 +45,7 @@ def retexture(command: Retexture, progress: Progress) -> Words:
     check_video_format(command.out)
     check_free(command.out, overwrite=command.overwrite)
     with Texture(command.texture) as texture, Painter(command, texture) as painter:
-        if is_recording(command.source):
-            words = play(command, painter, progress)
-        else:
-            words = Session(command.run, progress, painter).run()
+        words = (play if is_recording(command.source) else follow)(command, painter, progress)
     return words | {"painted_frames": painter.painted, "paint_ms": painter.milliseconds, "out": str(command.out)}
 
 
@@ -115,6 +114,27 @@ class Painter:
             self._sink.__exit__(UsageError, failure, None)
             raise
         self._sink.__exit__(kind, error, trace)
+
+
+def follow(command: Retexture, painter: Painter, progress: Progress) -> Words:
+    """Let a painter see a video while it is tracked.
+
+    Raises:
+        UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
+    """
+    session = Session(command.run, progress, record=False)
+    surface = None
+    with closing(session.frames()) as frames:
+        for one in frames:
+            try:
+                with completed():
+                    if one.surface is not None and one.surface is not surface:
+                        surface = one.surface
+                        painter.begin(surface.first, surface.points_px, surface.model, session.fps)
+                    painter.frame(one.frame, one.observation, one.estimate)
+            except KeyboardInterrupt:
+                session.interrupted = True
+    return session.summary.as_dict()
 
 
 def play(command: Retexture, painter: Painter, progress: Progress) -> Words:

@@ -6,7 +6,7 @@ from tracking.klt import Observation
 
 
 @dataclass
-class Tally:
+class Counts:
     """Counts of a run; nothing in it grows with the frames.
 
     Attributes:
@@ -33,13 +33,11 @@ class Tally:
         self._share_sum += self._share
 
     @property
-    def words(self) -> dict[str, object]:
-        """For the summary."""
-        return {
-            "visible_share": self._share_sum / self.frames if self.frames else None,
-            "visible_share_last": self._share if self.frames else None,
-            "objects": self.objects,
-            "losses": self.losses,
-            "recoveries": self.recoveries,
-            "frames_lost": self.frames_lost,
-        }
+    def visible_share(self) -> float | None:
+        """Share of the points seen, mean over the frames."""
+        return self._share_sum / self.frames if self.frames else None
+
+    @property
+    def visible_share_last(self) -> float | None:
+        """In the last frame."""
+        return self._share if self.frames else None

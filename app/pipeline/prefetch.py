@@ -11,19 +11,18 @@ from tracking.video import Frame
 SWITCH_S = 0.0005  # after which one thread lets another: with Python's 5 ms, each of many short waits costs as much
 
 
-class Ahead:
+class Prefetch:
     """A thread that is one frame ahead; a context manager, which does not wait for a source that is silent.
 
     Results do not depend on it: what is done ahead needs nothing of what goes on meanwhile.
 
     Args:
         frames: where they come from.
-        prepare: what is done with each, its picture given.
     """
 
-    def __init__(self, frames: Iterator[Frame], prepare: Callable[[Frame], None]) -> None:
-        self._frames, self._prepare = frames, prepare
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="ahead")
+    def __init__(self, frames: Iterator[Frame]) -> None:
+        self._frames = frames
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="prefetch")
         self._fetched: Future[Frame | None] | None = None
         self._prepared: Future[None] | None = None
 
@@ -36,10 +35,10 @@ class Ahead:
         sys.setswitchinterval(self._interval_s)
         self._thread.shutdown(wait=False, cancel_futures=True)
 
-    def begin(self) -> None:
-        """Go for the next frame; returns at once."""
+    def begin(self, prepare: Callable[[Frame], None]) -> None:
+        """Go for the next frame, and do what can be done with it early; returns at once."""
         self._fetched = fetched = self._thread.submit(next, self._frames, None)
-        self._prepared = self._thread.submit(self._prepare_fetched, fetched)
+        self._prepared = self._thread.submit(prepare_fetched, prepare, fetched)
 
     def fetched(self) -> Frame | None:
         """The frame begun with, once it is there; None at the end of the source.
@@ -55,7 +54,9 @@ class Ahead:
         assert self._prepared is not None
         self._prepared.result()
 
-    def _prepare_fetched(self, fetched: "Future[Frame | None]") -> None:
-        frame = None if fetched.exception() else fetched.result()
-        if frame is not None:
-            self._prepare(frame)
+
+def prepare_fetched(prepare: Callable[[Frame], None], fetched: "Future[Frame | None]") -> None:
+    """Do it, unless there is no frame."""
+    frame = None if fetched.exception() else fetched.result()
+    if frame is not None:
+        prepare(frame)

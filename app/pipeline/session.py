@@ -1,33 +1,37 @@
 """The frame loop: read, track, reconstruct, record."""
 
-from collections.abc import Iterator
-from functools import partial
+from collections import deque
+from collections.abc import Generator, Iterator
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from time import perf_counter
+from typing import Literal
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
+from app.files.names import RECORDINGS, beside, free_name
 from app.files.writing import check_free
-from app.options.run import Run, Words, as_words
+from app.options.run import Run, as_words
 from app.painting.compositing import Placement, painted
 from app.painting.picture import first_picture
-from app.pipeline.behind import Behind
-from app.pipeline.counts import Tally
+from app.pipeline.counts import Counts
 from app.pipeline.interrupts import completed
-from app.pipeline.observer import Followed, Observer
-from app.pipeline.parts import RECORDINGS, Parts, free_name
-from app.pipeline.prefetch import Ahead
+from app.pipeline.prefetch import Prefetch
+from app.pipeline.processed import InOrder, Processed, Surface
 from app.pipeline.stopwatch import Stopwatch
-from app.pipeline.successor import Successor, for_another
-from app.pipeline.tracked_object import Settled, Take
-from app.recording.recorder import Recorder
+from app.pipeline.successor import Successor, options_for_another
+from app.pipeline.summary import RunSummary, summary_of
+from app.pipeline.tracked_object import FrameShape, TrackedObject
+from app.recording.process import RecordingProcess
 from app.terminal.errors import UsageError, in_a_line
 from app.terminal.progress import Progress
 from reconstruction import ReconstructionError
 from tracking.guarded import Change, Guarded
-from tracking.klt import Observation
 from tracking.video import Frame, Video
+
+NO_PICTURE = np.empty((0, 0, 3), np.uint8)
 
 
 class Session:
@@ -36,71 +40,236 @@ class Session:
     Args:
         config: what the person asked for.
         progress: where to report.
-        observer: who else wants to know; with one, a recording is written only if its name is given.
+        record: whether a recording is written under a name of our own, too, if none is given.
+
+    Attributes:
+        fps: announced rate of the video, once the frames have begun.
+        interrupted: whether the run ends early; whoever sets it ends the run with the next frame.
+        summary: once the frames have ended: counts of the whole run, and what came out for the first object.
 
     Raises:
         UsageError, TrackingError: a file or option that cannot be used.
     """
 
-    def __init__(self, config: Run, progress: Progress, observer: Observer | None = None) -> None:
-        self._config, self._progress, self._observer = config, progress, observer
+    summary: RunSummary
+
+    def __init__(self, config: Run, progress: Progress, *, record: bool = True) -> None:
+        self._config, self._progress, self._record_unnamed = config, progress, record
         self._picture = first_picture(config.texture) if config.texture else None
-        self._followed = Followed(observer)
         for path in (config.output.out, config.output.tracks_out, config.output.shapes_out):
             check_free(path, overwrite=config.output.overwrite)
-        self._watch = Stopwatch()
-        self._tally = Tally()
+        self._watch, self._counts, self._order = Stopwatch(), Counts(), InOrder()
+        self._messages: list[str] = []  # of the source, to be recorded with the next frame
+        self._surface: Surface | None = None
         self._successor: Successor | None = None
-        self._heard: list[str] = []  # from the source, to be told with the next frame
-        self._interrupted = self._modelled = False
-        self._started = self._elapsed_s = 0.0
+        self._paths: list[Path | None] = []
+        self.fps = self._elapsed_s = 0.0
+        self.interrupted = False
 
-    def run(self) -> Words:
+    def run(self) -> RunSummary:
         """Process the whole source; an interrupt ends it early, with everything so far kept.
 
-        Returns:
-            the summary: counts of the whole run, and what came out for the first object.
+        Raises:
+            UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
+        """
+        self._order.wanted = False
+        deque(self.frames(), maxlen=0)
+        return self.summary
+
+    def frames(self) -> Generator[Processed, None, None]:
+        """The frames in the source's order, each as soon as its shape is known; an interrupt ends them early.
+
+        Closing the generator ends the run: what it has is recorded and saved.
 
         Raises:
             UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
         """
         config, output = self._config, self._config.output
         video = Video(
-            config.source, *config.frame_range, duration_s=config.duration, drop_late=config.drop_late, say=self._hear
+            config.source, *config.frame_range, duration_s=config.duration, drop_late=config.drop_late, say=self._told
         )
         with threadpool_limits(1), video:
-            frames = iter(video)
-            first, second = next(frames), next(frames, None)
+            source = iter(video)
+            first, second = next(source), next(source, None)
             if second is None:
                 raise UsageError(
                     f"{config.source} gives only one frame: a shape shows in how it moves; give a video, or more --frames"
                 )
-            self._fps, self._size = video.fps, video.size
-            self._take = take = Take(config, first, self._watch)
-            path = output.out
-            if path is None and self._observer is None:
-                path = free_name(RECORDINGS, config.source)
-            split_s = None if output.split_minutes is None else 60.0 * output.split_minutes
-            record, summary = partial(self._record, config), partial(self._summary, take)
-            parts = Parts(path, record, summary, split_s, overwrite=output.overwrite)
-            with Behind(parts) as self._recording, self._progress:
-                self._started = perf_counter()
-                try:
-                    self._progress.expect(video.frame_count)
-                    self._loop(first, chain([second], frames))
-                except KeyboardInterrupt:
-                    self._interrupted = True
-                self._finish()
-                self._followed.end()
-                self._elapsed_s = perf_counter() - self._started
-                self._recording.finish()
-        self._take.save()
-        return self._summary(take)
+            self.fps, self._size = video.fps, video.size
+            self._object = self._first_object = TrackedObject(config, first, self._watch)
+            self._path = output.out
+            if self._path is None and self._record_unnamed:
+                self._path = free_name(RECORDINGS, config.source)
+            needed = bool(self._path or output.connect or output.view)
+            with (
+                RecordingProcess(needed=needed) as self._recording,
+                self._progress,
+                Prefetch(chain([second], source)) as self._prefetch,
+            ):
+                self._started_s = perf_counter()
+                self._progress.expect(video.frame_count)
+                yield from self._objects(first)
 
-    def _record(self, config: Run, path: Path | None) -> Recorder:
-        """A recording of an object, or a part of it."""
-        output = config.output
-        return Recorder(
+    def _told(self, text: str) -> None:
+        """What the source has to tell, in its own thread."""
+        self._progress.say(text)
+        self._messages.append(text)
+
+    def _objects(self, first: Frame) -> Iterator[Processed]:
+        """One object after another."""
+        self._open_recording(first)
+        frame: Frame | None = first
+        while frame is not None:
+            try:
+                frame = yield from self._follow(frame)
+            except KeyboardInterrupt:
+                self.interrupted, frame = True, None
+            except GeneratorExit:
+                self.interrupted = True
+                self._end_object(last=True)
+                raise
+            self._end_object(last=frame is None)
+            if frame is not None:
+                self._begin_another(frame)
+        yield from self._order.ready()
+
+    def _follow(self, frame: Frame | None) -> Generator[Processed, None, Frame | None]:
+        """Follow the object to the end of the source, None, or until another is found: the frame that this begins with."""
+        while frame is not None and not self.interrupted:
+            if self._successor and self._successor.found:
+                return frame
+            with completed():
+                guarded = self._object.follow(frame)
+                if not self._config.drop_late:  # what is fetched early is late
+                    self._prefetch.begin(self._object.prepare)
+                self._tell_changes(frame, guarded)
+                self._reconstruct(frame, guarded)
+                if self._config.drop_late:
+                    self._prefetch.begin(self._object.prepare)
+            yield from self._order.ready()
+            with self._watch.time("decode"):
+                frame = self._prefetch.fetched()
+            with self._watch.time("track"):
+                self._prefetch.prepared()
+        return None
+
+    def _tell_changes(self, frame: Frame, guarded: Guarded) -> None:
+        """Record what the source told, and that the object was lost or found."""
+        while self._messages:
+            self._recording.tell("event", frame.index, frame.time_s, self._messages.pop(0), "WARN")
+        if guarded.change is Change.NONE:
+            return
+        if guarded.change is Change.LOST:
+            self._counts.losses += 1
+            config = options_for_another(self._config, self._counts.objects + 1)
+            self._successor = Successor(config, frame, self._watch, cut=guarded.cut)
+        else:
+            self._counts.recoveries += 1
+            self._successor = None
+        self._note(frame.index, frame.time_s, f"{guarded.change.value} at frame {frame.index}: {guarded.reason}", "WARN")
+
+    def _reconstruct(self, frame: Frame, guarded: Guarded) -> None:
+        """Make shapes of a frame's points, and record what is known."""
+        tracked, observation = self._object, guarded.observation
+        self._counts.add(observation, lost=tracked.lost)
+        self._order.add(frame, observation)
+        if tracked.lost and self._surface:
+            self._order.end(self._surface)
+        phase = tracked.phase
+        shapes = tracked.shape(frame, observation)
+        if self._successor:
+            self._successor.look(frame)
+        with self._watch.time("record"):
+            self._split_recording(frame)
+            shown = frame if tracked.config.output.image == "jpeg" else replace(frame, image=NO_PICTURE)
+            self._recording.tell("observe", shown, observation, phase=phase.value)
+            self._record(shapes)
+        self._recording.tell("timing", frame.index, frame.time_s, dict(self._watch.now))
+        self._watch.now.clear()
+        self._progress.advance(tracked.phase.value, tracked.collected.last_rms_px)
+
+    def _record(self, shapes: list[FrameShape]) -> None:
+        """Record shapes; with the first of them, the model."""
+        if shapes and self._surface is None:
+            self._begin_surface(shapes[-1].index, shapes[-1].time_s)
+        for shape in shapes:
+            index, time_s, estimate = shape.index, shape.time_s, shape.estimate
+            self._recording.tell("estimate", index, time_s, estimate)
+            if estimate.switch:
+                self._note(index, time_s, estimate.switch.at(index), "WARN")
+            self._order.shape(index, estimate, self._surface)
+
+    def _begin_surface(self, index: int, time_s: float) -> None:
+        """The model of the object is known: record it, and how its rest shape was found."""
+        self._surface = self._object.surface
+        for note in self._object.notes:
+            self._note(index, time_s, note)
+        self._record_model(self._surface)
+
+    def _record_model(self, surface: Surface) -> None:
+        model, picture = surface.model, surface.first.image
+        if self._picture is not None and self._object.config.texture:
+            placement = Placement(self._config.place, self._config.opacity)
+            picture = painted(picture, surface.points_px, model, self._picture, placement)
+        self._recording.tell(
+            "rest",
+            model.basis,
+            model.mesh.faces,
+            model.mesh.edges,
+            model.camera,
+            texture_bgr=picture,
+            texture_px=surface.points_px,
+        )
+
+    def _end_object(self, *, last: bool) -> None:
+        """Record the shapes that are left and the summary, and save the files asked for.
+
+        Raises:
+            ReconstructionError: the last object has too few frames for a rest shape; if interrupted, it is only told.
+        """
+        try:
+            shapes = self._object.finish()
+        except ReconstructionError as error:
+            if last and not self.interrupted:
+                raise
+            self._progress.say(in_a_line(error))
+            shapes = []
+        with self._watch.time("record"):
+            self._record(shapes)
+        if last:
+            self._order.end(self._surface)
+            self._elapsed_s = perf_counter() - self._started_s
+            self.summary = self._summary(self._first_object)
+        self._recording.tell("summary", self._summary(self._object).as_dict())
+        if self._surface is not None:  # its figure would have slowed the run
+            self._recording.tell("modes", self._surface.model.basis, self._surface.model.mesh, self._surface.metric)
+        self._object.save()
+
+    def _begin_another(self, frame: Frame) -> None:
+        """From this frame on the successor is followed, in a recording of its own."""
+        assert self._successor is not None
+        assert self._successor.found is not None
+        text = (
+            f"another object from frame {frame.index} on: followed since frame {self._successor.found.first.index}, "
+            f"nothing seen of the one before since frame {self._successor.lost.index}"
+        )
+        self._note(frame.index, frame.time_s, text, "WARN")  # where one ends and
+        self._object, self._successor, self._surface = self._successor.found, None, None
+        self._counts.objects += 1
+        self._open_recording(frame)
+        self._recording.tell("event", frame.index, frame.time_s, text, "WARN")  # where the other begins
+        self._begin_surface(frame.index, frame.time_s)
+
+    def _open_recording(self, frame: Frame) -> None:
+        """Write another recording from a frame on: the first, of another object, or the next part of a long one."""
+        config, output = self._object.config, self._object.config.output
+        self._opened_s = frame.time_s
+        path, part = self._path, len(self._paths) + 1
+        if path is not None and part > 1:
+            path = beside(path, f"part{part}", overwrite=output.overwrite)
+        self._paths.append(path)
+        self._recording.tell(
+            "open",
             path,
             configuration=as_words(config),
             size=self._size,
@@ -111,134 +280,28 @@ class Session:
             overwrite=output.overwrite,
         )
 
-    def _hear(self, text: str) -> None:
-        """What the source has to say, in its own thread."""
+    def _split_recording(self, frame: Frame) -> None:
+        """Go on in another file, if it is time."""
+        minutes = self._config.output.split_minutes
+        if minutes and self._surface and frame.time_s - self._opened_s >= 60.0 * minutes:
+            self._recording.tell("summary", self._summary(self._object).as_dict())
+            self._open_recording(frame)
+            self._record_model(self._surface)
+
+    def _note(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:
+        """Tell the person, and record it."""
         self._progress.say(text)
-        self._heard.append(text)
+        self._recording.tell("event", index, time_s, text, level)
 
-    def _loop(self, first: Frame, frames: Iterator[Frame]) -> None:
-        frame: Frame | None = first
-        with Ahead(frames, lambda frame: self._take.begin(frame)) as ahead:
-            while frame is not None:
-                with completed():
-                    if self._successor and self._successor.take:
-                        self._go_on_with(self._successor.take, self._successor.lost, frame)
-                    guarded = self._take.follow(frame)
-                    if not self._config.drop_late:  # what is fetched early is late
-                        ahead.begin()
-                    self._tell(frame, guarded)
-                    self._step(frame, guarded.observation)
-                    if self._config.drop_late:
-                        ahead.begin()
-                with self._watch.time("decode"):
-                    frame = ahead.fetched()
-                with self._watch.time("track"):
-                    ahead.prepared()
-
-    def _tell(self, frame: Frame, guarded: Guarded) -> None:
-        """Say what the source said, and that the object was lost or found."""
-        while self._heard:
-            self._recording.event(frame.index, frame.time_s, self._heard.pop(0), "WARN")
-        if guarded.change is Change.NONE:
-            return
-        if guarded.change is Change.LOST:
-            self._tally.losses += 1
-            config = for_another(self._config, self._tally.objects + 1)
-            self._successor = Successor(config, frame, self._watch, cut=guarded.cut)
-        else:
-            self._tally.recoveries += 1
-            self._successor = None
-        text = f"{guarded.change.value} at frame {frame.index}: {guarded.reason}"
-        self._recording.event(frame.index, frame.time_s, text, "WARN")
-        self._progress.say(text)
-
-    def _step(self, frame: Frame, observation: Observation) -> None:
-        take = self._take
-        self._tally.add(observation, lost=take.lost)
-        self._followed.add(frame, observation)
-        if take.lost and self._modelled:
-            self._followed.end()
-        phase = take.phase
-        settled = take.shape(frame, observation)
-        if self._successor:
-            self._successor.look(frame)
-        with self._watch.time("record"):
-            self._recording.observe(frame, observation, phase=phase.value)
-            self._settle(settled)
-        self._recording.timing(frame.index, frame.time_s, self._watch.now)
-        self._watch.now.clear()
-        self._progress.advance(take.phase.value, take.collected.last_rms_px)
-
-    def _settle(self, settled: list[Settled]) -> None:
-        """Record shapes; with the first of them, the model."""
-        if settled and not self._modelled:
-            self._record_model(settled[-1].index, settled[-1].time_s)
-        for one in settled:
-            self._recording.estimate(one.index, one.time_s, one.estimate)
-            if one.estimate.switch:
-                self._recording.event(one.index, one.time_s, one.estimate.switch.at(one.index), "WARN")
-                self._progress.say(one.estimate.switch.at(one.index))
-            self._followed.shape(one.index, one.estimate)
-
-    def _go_on_with(self, take: Take, lost: Frame, frame: Frame) -> None:
-        """From this frame on another object is followed: what there is of the one before is complete."""
-        try:
-            self._settle(self._take.finish())
-        except ReconstructionError as error:  # it was lost before its bootstrap was over
-            self._progress.say(in_a_line(error))
-        self._take.save()
-        text = (
-            f"another object from frame {frame.index} on: followed since frame {take.first.index}, "
-            f"nothing seen of the one before since frame {lost.index}"
-        )
-        self._progress.say(text)
-        self._recording.event(frame.index, frame.time_s, text, "WARN")  # where one ends and
-        self._recording.another(partial(self._record, take.config), partial(self._summary, take))
-        self._recording.event(frame.index, frame.time_s, text, "WARN")  # where the other begins
-        self._take, self._successor = take, None
-        self._tally.objects += 1
-        self._record_model(frame.index, frame.time_s)
-
-    def _finish(self) -> None:
-        """Settle for what the bootstrap has; an interrupted one may have too little, and the run is kept all the same."""
-        try:
-            settled = self._take.finish()
-        except ReconstructionError as error:
-            if not self._interrupted:
-                raise
-            self._progress.say(in_a_line(error))
-            return
-        with self._watch.time("record"):
-            self._settle(settled)
-
-    def _record_model(self, index: int, time_s: float) -> None:
-        """Everything about the model, and a word on how its rest shape was found."""
-        take, reconstruction = self._take, self._take.reconstruction
-        rest, model = reconstruction.rest, reconstruction.model
-        assert rest is not None
-        assert reconstruction.metric is not None
-        for note in filter(None, (rest.note, reconstruction.focal_note)):
-            self._recording.event(index, time_s, note)
-            self._progress.say(note)
-        first = take.first.image
-        if self._picture is not None and take.config.texture:
-            placement = Placement(self._config.place, self._config.opacity)
-            first = painted(first, take.points_px, model, self._picture, placement)
-        self._recording.model(model, first, take.points_px, reconstruction.metric)
-        if self._observer:
-            self._observer.begin(take.first, take.points_px, model, self._fps)
-        self._modelled = True
-
-    def _summary(self, take: Take) -> Words:
+    def _summary(self, tracked: TrackedObject) -> RunSummary:
         """What is known of the whole run, and of one object."""
-        frames, elapsed_s = self._tally.frames, self._elapsed_s or perf_counter() - self._started
-        return {
-            "source": self._config.source,
-            "frames": frames,
-            "interrupted": self._interrupted,
-            **take.words,
-            **self._tally.words,
-            "fps": frames / elapsed_s,
-            "stage_ms": {stage: total / max(frames, 1) for stage, total in self._watch.total.items()},
-            **self._recording.words,
-        }
+        elapsed_s = self._elapsed_s or perf_counter() - self._started_s
+        return summary_of(
+            self._config.source,
+            tracked,
+            self._counts,
+            self._watch,
+            elapsed_s=elapsed_s,
+            interrupted=self.interrupted,
+            recordings=self._paths,
+        )

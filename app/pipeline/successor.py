@@ -1,15 +1,14 @@
 """What is followed when an object does not come back: another one, if there is one that moves."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
+from app.files.names import beside
 from app.options.run import Run
-from app.pipeline.parts import beside
 from app.pipeline.prepare import RECOVERED
 from app.pipeline.stopwatch import Stopwatch
-from app.pipeline.tracked_object import Take
+from app.pipeline.tracked_object import TrackedObject
 from reconstruction import ReconstructionError
 from reconstruction.online import Phase
 from tracking import TrackingError
@@ -35,15 +34,15 @@ class Successor:
 
     Attributes:
         lost: the same.
-        take: the other object, once it has a model.
+        found: the other object, once it has a model.
     """
 
     def __init__(self, config: Run, lost: Frame, watch: Stopwatch, *, cut: bool) -> None:
         self.lost = lost
-        self.take: Take | None = None
+        self.found: TrackedObject | None = None
         self._config, self._watch = config, watch
         self._due_s = lost.time_s + (AFTER_CUT_S if cut else AFTER_COVER_S)
-        self._tried: Take | None = None
+        self._tried: TrackedObject | None = None
         self._moves = False
 
     def look(self, frame: Frame) -> None:
@@ -53,14 +52,14 @@ class Successor:
         try:
             if self._tried is None:
                 with self._watch.time("track"):
-                    self._tried, self._moves = Take(self._config, frame, self._watch), False
+                    self._tried, self._moves = TrackedObject(self._config, frame, self._watch), False
             good = self._goes_on(self._tried, frame)
         except (TrackingError, ReconstructionError):
             good = False
         if not good:
             self._tried, self._due_s = None, frame.time_s + AGAIN_S
 
-    def _goes_on(self, tried: Take, frame: Frame) -> bool:
+    def _goes_on(self, tried: TrackedObject, frame: Frame) -> bool:
         observation = tried.follow(frame).observation
         if observation.visible.mean() < SEEN:  # as when it is lost
             return False
@@ -68,23 +67,19 @@ class Successor:
         if self._moves:
             tried.shape(frame, observation)
             if tried.phase is Phase.TRACKING:
-                self.take = tried
+                self.found = tried
         return True
 
 
-def way_px(take: Take, observation: Observation) -> float:
+def way_px(tracked: TrackedObject, observation: Observation) -> float:
     """How far the points that are seen have come since the first frame: the median, px."""
-    way = np.linalg.norm(observation.points_px - take.points_px, axis=1)
+    way = np.linalg.norm(observation.points_px - tracked.points_px, axis=1)
     return float(np.median(way[observation.visible]))
 
 
-def for_another(config: Run, number: int) -> Run:
+def options_for_another(config: Run, number: int) -> Run:
     """What was asked for, as far as it goes for another object: texture, true shapes and rest shape are the first one's."""
-    output = config.output
-
-    def own(path: Path | None) -> Path | None:
-        return path and beside(path, f"object{number}", overwrite=output.overwrite)
-
+    output, own = config.output, f"object{number}"
     return replace(
         config,
         rest_shape=config.rest_shape if config.rest_shape in RECOVERED else "auto",
@@ -93,8 +88,8 @@ def for_another(config: Run, number: int) -> Run:
         place=None,
         output=replace(
             output,
-            tracks_out=own(output.tracks_out),
-            shapes_out=own(output.shapes_out),
+            tracks_out=output.tracks_out and beside(output.tracks_out, own, overwrite=output.overwrite),
+            shapes_out=output.shapes_out and beside(output.shapes_out, own, overwrite=output.overwrite),
             image="jpeg" if output.image == "video" else output.image,  # the video file is in the first part
         ),
     )

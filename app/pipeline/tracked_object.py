@@ -4,10 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.options.run import Run, Words
-from app.pipeline.estimates import Collected, save_shapes, score_words
+from app.options.run import Run
+from app.pipeline.estimates import Collected, save_shapes
 from app.pipeline.prepare import prepared
+from app.pipeline.processed import Surface
 from app.pipeline.stopwatch import Stopwatch
+from reconstruction.evaluation import Score
 from reconstruction.online import Phase
 from reconstruction.window.model import ShapeEstimate
 from tracking.guarded import Change, Guarded, GuardedTracker
@@ -17,15 +19,15 @@ from tracking.video import Frame
 
 
 @dataclass(frozen=True)
-class Settled:
-    """The shape of a frame, once it is known."""
+class FrameShape:
+    """The shape of a frame of the source."""
 
     index: int
     time_s: float
     estimate: ShapeEstimate
 
 
-class Take:
+class TrackedObject:
     """One object, followed from a frame that shows it.
 
     Args:
@@ -63,7 +65,20 @@ class Take:
         """What is being done about it."""
         return Phase.LOST if self.lost else self.reconstruction.phase
 
-    def begin(self, frame: Frame) -> None:
+    @property
+    def notes(self) -> list[str]:
+        """How rest shape and focal length were found, in words."""
+        rest = self.reconstruction.rest
+        return [note for note in (rest.note if rest else "", self.reconstruction.focal_note) if note]
+
+    @property
+    def surface(self) -> Surface:
+        """What its shapes are of; there once the bootstrap is over."""
+        metric = self.reconstruction.metric
+        assert metric is not None
+        return Surface(self.first, self.points_px, self.reconstruction.model, metric)
+
+    def prepare(self, frame: Frame) -> None:
         """Do what can be done early with the next frame, in another thread."""
         self._tracker.begin(frame.image)
 
@@ -77,7 +92,7 @@ class Take:
             self.reconstruction.restart()
         return guarded
 
-    def shape(self, frame: Frame, observation: Observation) -> list[Settled]:
+    def shape(self, frame: Frame, observation: Observation) -> list[FrameShape]:
         """The shapes known with this frame, oldest first; none while the object is lost: better than a wrong one.
 
         Raises:
@@ -90,37 +105,24 @@ class Take:
             return []
         self._times[frame.index] = frame.time_s
         with self._watch.time("reconstruct"):
-            return self._settled(self.reconstruction.update(observation.points_px.T, observation.visible))
+            return self._of_frames(self.reconstruction.update(observation.points_px.T, observation.visible))
 
-    def finish(self) -> list[Settled]:
-        """No more frames: settle for what the bootstrap has.
+    def finish(self) -> list[FrameShape]:
+        """The shapes of the frames that still wait: no more frames come.
 
         Raises:
             ReconstructionError: it has too little.
         """
         with self._watch.time("reconstruct"):
-            return self._settled(self.reconstruction.finish())
+            return self._of_frames(self.reconstruction.finish())
 
     @property
-    def words(self) -> Words:
-        """For the summary."""
+    def score(self) -> Score | None:
+        """Errors against the truth; None without one, or before there is a shape."""
         rest = self.reconstruction.rest
-        words: Words = {
-            "points": len(self.points_px),
-            "rest_shape": rest.kind if rest else None,
-            "rest_shape_note": rest.note if rest else None,
-            "bootstrap_frames": self.reconstruction.bootstrap_frames,
-            "deformation": self.reconstruction.deformation,
-            "metric": self.reconstruction.metric,
-            "priors": self.reconstruction.weights,
-            **self.reconstruction.focal_words,
-            "branch_switches": self.collected.switches,
-            "reprojection_rms_px": self.collected.reprojection_rms_px,
-        }
-        if self._truth and rest:
-            mesh = self.reconstruction.model.mesh
-            words |= score_words(self.collected.score_against(self._truth, rest.motion.shape, mesh))
-        return words
+        if self._truth is None or rest is None:
+            return None
+        return self.collected.score_against(self._truth, rest.motion.shape, self.reconstruction.model.mesh)
 
     def save(self) -> None:
         """Write the files asked for.
@@ -137,11 +139,11 @@ class Take:
         if output.shapes_out and self.collected.estimates:
             save_shapes(output.shapes_out, self.collected.estimates, self.reconstruction.model, self.collected.lost)
 
-    def _settled(self, estimates: list[ShapeEstimate]) -> list[Settled]:
+    def _of_frames(self, estimates: list[ShapeEstimate]) -> list[FrameShape]:
         """Estimates with the oldest frames that wait for one."""
-        settled = []
+        shapes = []
         for estimate in estimates:
             index = next(iter(self._times))
-            settled.append(Settled(index, self._times.pop(index), estimate))
+            shapes.append(FrameShape(index, self._times.pop(index), estimate))
             self.collected.add(index, estimate)
-        return settled
+        return shapes

@@ -58,7 +58,7 @@ def run(video: Path, truth: Path, roi: tuple[int, int, int, int], folder: Path, 
         image="none",
     )
     config = Run(source=str(video), roi=roi, ground_truth=truth, output=output, **options)  # type: ignore[arg-type]
-    words = Session(config, Progress()).run()
+    words = Session(config, Progress()).run().as_dict()
     with np.load(folder / "tracks.npz") as tracks:
         visible = tracks["visible"]
     frames, errors = errors_by_frame(folder / "shapes.npz", truth)

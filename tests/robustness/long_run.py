@@ -66,12 +66,12 @@ def main(video: Path = FACE) -> int:
         gc.collect()
         watcher = Watcher()
         run = Run(source=str(source), roi=ROI, output=Output(out=Path(folder, "run.rrd")))
-        words = Session(run, watcher).run()
+        summary = Session(run, watcher).run()
     memory, step = np.array(watcher.resident_mb), np.diff(watcher.at_s) * 1e3
     grown = float(np.median(memory[-100:]) - np.median(memory[WARM : WARM + 100]))
     early, late = float(np.median(step[WARM : 2 * WARM])), float(np.median(step[-WARM:]))
     sys.stdout.write(
-        f"{len(memory)} frames, {words['losses']} losses; memory at frame {WARM}: {memory[WARM]:.1f} MB, "
+        f"{len(memory)} frames, {summary.losses} losses; memory at frame {WARM}: {memory[WARM]:.1f} MB, "
         f"at the end {memory[-1]:.1f} MB, grown {grown:.1f} MB; "
         f"median processor time per frame {early:.1f} ms, at the end {late:.1f} ms\n"
     )

@@ -64,7 +64,7 @@ def filmed(work: Work, footage: Footage) -> Result:
         output = Output(out=path, overwrite=True)
         run = replace(footage.run, model=Model(focal=focal), output=output)
         try:
-            trial = Trial(Session(run, Part(partial(work.step, 1 / expected_frames(run)))).run())
+            trial = Trial(Session(run, Part(partial(work.step, 1 / expected_frames(run)))).run().as_dict())
         except ReconstructionError as error:
             trial = Trial({}, in_a_line(error))
             remarks.append(f"{trial.failure}.")

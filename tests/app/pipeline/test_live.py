@@ -70,7 +70,7 @@ def test_a_throttled_pipeline_stays_up_to_date(camera: Camera, monkeypatch: pyte
         source=camera.url, roi=(40, 40, 240, 160), points=100, rest_shape="plane", drop_late=True, duration=5.0,
         model=Model(modes=5, bootstrap_frames=5), output=Output(out=Path("live.rrd")),
     )  # fmt: skip
-    words = Session(run, Throttled()).run()
+    words = Session(run, Throttled()).run().as_dict()
     assert words["frames"] < 0.7 * 5 * RATE
     assert np.median(late[5:]) < RATE, late  # all of them, one after another, would be three times as late in the end
     playback = Playback.load(Path("live.rrd"))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.pipeline.prefetch import SWITCH_S, Ahead
+from app.pipeline.prefetch import SWITCH_S, Prefetch
 from tracking.video import Frame
 
 
@@ -17,31 +17,31 @@ def frames(count: int) -> Iterator[Frame]:
 
 def test_frames_come_in_order_and_prepared() -> None:
     prepared: list[int] = []
-    with Ahead(frames(5), lambda frame: prepared.append(frame.index)) as ahead:
+    with Prefetch(frames(5)) as prefetch:
         for i in range(5):
-            ahead.begin()
-            frame = ahead.fetched()
+            prefetch.begin(lambda frame: prepared.append(frame.index))
+            frame = prefetch.fetched()
             assert frame is not None
             assert frame.index == i
-            ahead.prepared()
+            prefetch.prepared()
             assert prepared == list(range(i + 1))
-        ahead.begin()
-        assert ahead.fetched() is None
-        ahead.prepared()
+        prefetch.begin(lambda frame: prepared.append(frame.index))
+        assert prefetch.fetched() is None
+        prefetch.prepared()
     assert prepared == list(range(5))
 
 
 def test_threads_switch_fast_meanwhile_only() -> None:
     before = sys.getswitchinterval()
-    with Ahead(frames(1), lambda _: None):
+    with Prefetch(frames(1)):
         assert sys.getswitchinterval() == pytest.approx(SWITCH_S)
     assert sys.getswitchinterval() == before
 
 
 def test_it_works_while_the_caller_does() -> None:
     busy = threading.Event()
-    with Ahead(frames(2), lambda _: busy.set()) as ahead:
-        ahead.begin()
+    with Prefetch(frames(2)) as prefetch:
+        prefetch.begin(lambda _: busy.set())
         assert busy.wait(5.0)  # nobody waited for it
 
 
@@ -51,13 +51,13 @@ def test_what_the_source_raises_is_raised_where_the_frame_is_wanted() -> None:
         raise OSError("unplugged")
 
     prepared: list[int] = []
-    with Ahead(broken(), lambda frame: prepared.append(frame.index)) as ahead:
-        ahead.begin()
-        ahead.fetched()
-        ahead.begin()
+    with Prefetch(broken()) as prefetch:
+        prefetch.begin(lambda frame: prepared.append(frame.index))
+        prefetch.fetched()
+        prefetch.begin(lambda frame: prepared.append(frame.index))
         with pytest.raises(OSError, match="unplugged"):
-            ahead.fetched()
-        ahead.prepared()
+            prefetch.fetched()
+        prefetch.prepared()
     assert prepared == [0]
 
 
@@ -65,11 +65,11 @@ def test_what_the_preparation_raises_is_raised() -> None:
     def fails(_: Frame) -> None:
         raise ValueError("no")
 
-    with Ahead(frames(1), fails) as ahead:
-        ahead.begin()
-        assert ahead.fetched() is not None
+    with Prefetch(frames(1)) as prefetch:
+        prefetch.begin(fails)
+        assert prefetch.fetched() is not None
         with pytest.raises(ValueError, match="no"):
-            ahead.prepared()
+            prefetch.prepared()
 
 
 def test_a_silent_source_is_not_waited_for() -> None:
@@ -80,7 +80,7 @@ def test_a_silent_source_is_not_waited_for() -> None:
         ended.set()
         yield from frames(1)
 
-    with Ahead(silent(), lambda _: None) as ahead:
-        ahead.begin()
+    with Prefetch(silent()) as prefetch:
+        prefetch.begin(lambda _: None)
     assert not ended.is_set()
     speak.set()

@@ -1,14 +1,17 @@
 """The frame loop: frame numbers, stages, interrupts at awkward moments."""
 
+import json
+import threading
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from app.files.names import free_name
 from app.options.model import Model
 from app.options.run import Output, Run
-from app.pipeline.parts import free_name
 from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
@@ -31,6 +34,12 @@ def config(videos: Path, frames: str = ":20", rest_shape: str = "auto", **output
     )
 
 
+def quick(videos: Path, **output: object) -> Run:
+    """One whose bootstrap is over after five frames."""
+    asked = config(videos, rest_shape="plane", **output)
+    return replace(asked, model=replace(asked.model, bootstrap_frames=5))
+
+
 class Impatient(Progress):
     """Somebody who presses Ctrl-C after some frames."""
 
@@ -51,7 +60,7 @@ def in_folder(here: Path) -> None:
 
 
 def test_frames_keep_their_numbers_in_the_source(videos: Path) -> None:
-    words = Session(config(videos, "7:25", shapes_out=Path("shapes.npz")), Progress()).run()
+    words = Session(config(videos, "7:25", shapes_out=Path("shapes.npz")), Progress()).run().as_dict()
     assert words["frames"] == 18
     assert words["interrupted"] is False
     with np.load("shapes.npz") as shapes:
@@ -59,7 +68,7 @@ def test_frames_keep_their_numbers_in_the_source(videos: Path) -> None:
 
 
 def test_stages_add_up_to_the_time_it_took(videos: Path) -> None:
-    words = Session(config(videos), Progress()).run()
+    words = Session(config(videos), Progress()).run().as_dict()
     assert isinstance(words["stage_ms"], dict)
     assert isinstance(words["fps"], float)
     assert min(words["stage_ms"].values()) >= 0
@@ -69,7 +78,7 @@ def test_stages_add_up_to_the_time_it_took(videos: Path) -> None:
 @pytest.mark.parametrize("rest_shape", ["auto", "plane", "rigid"])
 @pytest.mark.parametrize("frames", [1, 3, 9, 18])
 def test_interrupts_keep_the_recording_at_any_moment(videos: Path, frames: int, rest_shape: str) -> None:
-    words = Session(config(videos, rest_shape=rest_shape), Impatient(frames)).run()
+    words = Session(config(videos, rest_shape=rest_shape), Impatient(frames)).run().as_dict()
     assert words["interrupted"] is True
     assert words["frames"] == frames
     verify(Path("run.rrd"))
@@ -78,13 +87,13 @@ def test_interrupts_keep_the_recording_at_any_moment(videos: Path, frames: int, 
 def test_a_failed_run_leaves_nothing(videos: Path, here: Path) -> None:
     files = {"tracks_out": Path("tracks.npz"), "shapes_out": Path("shapes.npz")}
     with pytest.raises(ReconstructionError, match="cannot recover a rest shape"):
-        Session(config(videos, ":5", "rigid", **files), Progress()).run()
+        Session(config(videos, ":5", "rigid", **files), Progress()).run().as_dict()
     assert list(here.iterdir()) == []
 
 
 def test_an_interrupt_without_a_shape_writes_the_tracks_it_has(videos: Path) -> None:
     files = {"tracks_out": Path("tracks.npz"), "shapes_out": Path("shapes.npz")}
-    words = Session(config(videos, rest_shape="rigid", **files), Impatient(3)).run()
+    words = Session(config(videos, rest_shape="rigid", **files), Impatient(3)).run().as_dict()
     assert words["rest_shape"] is None
     with np.load("tracks.npz") as tracks:
         assert len(tracks["W"]) == 3
@@ -117,7 +126,9 @@ def test_recordings_are_named_after_their_source(source: str, name: str, here: P
 
 def test_priors_are_recorded_as_they_were_asked_for_and_as_they_were(videos: Path) -> None:
     asked = config(videos)
-    words = Session(replace(asked, model=replace(asked.model, priors={"rest": 0.5, "scale": 0})), Progress()).run()
+    words = (
+        Session(replace(asked, model=replace(asked.model, priors={"rest": 0.5, "scale": 0})), Progress()).run().as_dict()
+    )
     playback = Playback.load(Path("run.rrd"))
     assert playback.configuration["priors"] == "rest=0.5,scale=0"
     assert playback.summary is not None
@@ -137,9 +148,53 @@ def test_a_switch_of_branches_is_told_and_counted(
         return replace(estimate, switch=Switch(-0.5, 0.0, 0.62)) if estimate.frame == 4 else estimate
 
     monkeypatch.setattr(SlidingWindow, "advance", switching)
-    words = Session(config(videos, "7:25"), Progress()).run()
+    words = Session(config(videos, "7:25"), Progress()).run().as_dict()
     told = "bent back at frame 11: energy 0.62 of the other branch"
     assert words["branch_switches"] == 1
     assert told in capsys.readouterr().err
     events = [(frame, level, text) for frame, _, level, text in Playback.load(Path("run.rrd")).events]
     assert (11, "WARN", told) in events
+
+
+def test_frames_are_given_as_soon_as_their_shapes_are_known(videos: Path) -> None:
+    session = Session(config(videos, "7:25"), Progress())
+    processed = list(session.frames())
+    assert [one.frame.index for one in processed] == list(range(7, 25))
+    assert session.summary.frames == 18
+    assert not session.interrupted
+    surface = processed[0].surface
+    assert surface is not None
+    np.testing.assert_array_equal(surface.points_px, processed[0].observation.points_px)
+    for one in processed:
+        assert one.surface is surface
+        assert one.estimate is not None
+        assert one.estimate.shape.shape == (3, len(surface.points_px))
+
+
+def test_whoever_wants_no_more_frames_keeps_what_there_was(videos: Path) -> None:
+    session = Session(quick(videos, tracks_out=Path("tracks.npz")), Progress())
+    with closing(session.frames()) as frames:
+        assert next(frames).frame.index == 0
+    assert session.summary.interrupted
+    assert 0 < session.summary.frames < 20
+    verify(Path("run.rrd"))
+    assert Playback.load(Path("run.rrd")).summary == json.loads(json.dumps(session.summary.as_dict()))
+    with np.load("tracks.npz") as tracks:
+        assert len(tracks["W"]) == session.summary.frames
+    assert threading.active_count() == 1
+
+
+def test_whoever_follows_can_end_it(videos: Path) -> None:
+    session = Session(quick(videos), Progress(), record=False)
+    for one in session.frames():
+        if one.frame.index == 5:
+            session.interrupted = True
+    assert session.summary.interrupted
+    assert session.summary.frames < 20
+
+
+def test_no_recording_is_written_that_nobody_asked_for(videos: Path, here: Path) -> None:
+    summary = Session(replace(config(videos), output=Output()), Progress(), record=False).run()
+    assert summary.recording is None
+    assert "recording" not in summary.as_dict()
+    assert list(here.iterdir()) == []

@@ -10,22 +10,18 @@ import pytest
 from numpy.typing import NDArray
 
 from app.commands.retexture import retexture
+from app.files.names import beside
 from app.options.model import Model
 from app.options.retexture import Retexture
 from app.options.run import Output, Run
-from app.pipeline.observer import Observer
-from app.pipeline.parts import beside
 from app.pipeline.session import Session
 from app.pipeline.stopwatch import Stopwatch
-from app.pipeline.successor import AFTER_CUT_S, Successor, for_another
+from app.pipeline.successor import AFTER_CUT_S, Successor, options_for_another
 from app.playback.playback import Playback
 from app.terminal.progress import Progress
-from reconstruction.window.model import Model as Shapes
-from reconstruction.window.model import ShapeEstimate
 from tests.app.command_line import Command, grain, in_own_process, turning, write_video
 from tests.synthetic_run import verify
 from tests.tracking.scene import SIZE, texture
-from tracking.klt import Observation
 from tracking.video import Frame, Video
 
 Image = NDArray[np.uint8]
@@ -78,7 +74,8 @@ def scenes(path: Path, *pictures: Iterable[Image]) -> Path:
 def run(video: Path, bootstrap_frames: int = 5, rest_shape: str = "plane", **output: object) -> dict[str, object]:
     model = Model(modes=5, bootstrap_frames=bootstrap_frames)
     written = Output(out=Path("run.rrd"), image="none", **output)  # type: ignore[arg-type]
-    return Session(Run(str(video), points=100, rest_shape=rest_shape, model=model, output=written), Progress()).run()
+    config = Run(str(video), points=100, rest_shape=rest_shape, model=model, output=written)
+    return Session(config, Progress()).run().as_dict()
 
 
 def test_another_object_gets_a_part_with_a_model_of_its_own(film: Path) -> None:
@@ -177,30 +174,16 @@ def test_parts_of_an_earlier_run_are_kept_or_replaced(here: Path) -> None:
     assert beside(first, "part2", overwrite=True) == second
 
 
-class Follower(Observer):
-    """Notes what it is told."""
-
-    def __init__(self) -> None:
-        self.begun: list[tuple[int, int]] = []
-        self.frames: list[tuple[int, bool]] = []
-
-    def begin(self, first: Frame, points_px: NDArray[np.float64], model: Shapes, fps: float) -> None:  # noqa: ARG002
-        self.begun.append((first.index, len(self.frames)))
-
-    def frame(self, frame: Frame, observation: Observation, estimate: ShapeEstimate | None) -> None:
-        assert estimate is None or len(estimate.visible) == len(observation.visible)
-        self.frames.append((frame.index, estimate is not None))
-
-
-def test_who_follows_a_run_hears_of_both(two_scenes: Path) -> None:
-    follower = Follower()
+def test_frames_of_both_are_given_in_order(two_scenes: Path) -> None:
     config = Run(str(two_scenes), points=100, rest_shape="plane", model=Model(modes=5, bootstrap_frames=5))
-    Session(config, Progress(), follower).run()
-    (first, before), (second, between) = follower.begun
-    assert (first, before) == (0, 0)
-    assert second >= CUT + WAIT
-    assert [index for index, _ in follower.frames] == list(range(FRAMES))
-    assert [shaped for _, shaped in follower.frames] == [not CUT <= index < between for index in range(FRAMES)]
+    processed = list(Session(config, Progress(), record=False).frames())
+    surfaces = list(dict.fromkeys(one.surface for one in processed))
+    assert [surface.first.index >= CUT + WAIT for surface in surfaces if surface] == [False, True]
+    begun = [one.surface for one in processed].index(surfaces[1])
+    assert [one.frame.index for one in processed] == list(range(FRAMES))
+    assert [one.estimate is not None for one in processed] == [not CUT <= index < begun for index in range(FRAMES)]
+    for one in processed:
+        assert one.estimate is None or len(one.estimate.visible) == len(one.observation.visible)
 
 
 def test_a_picture_stays_on_the_object_it_was_put_on(two_scenes: Path) -> None:
@@ -230,10 +213,10 @@ def test_what_is_covered_has_longer_than_what_was_cut(cut: bool, wait_s: float) 
     successor = Successor(config, Frame(0, 100.0, pictures[0]), Stopwatch(), cut=cut)
     for index, picture in enumerate(pictures):
         successor.look(Frame(index, 100.0 + wait_s - 1.0 + index / 30, picture))
-        if successor.take:
+        if successor.found:
             break
-    assert successor.take is not None
-    assert successor.take.first.index == 30
+    assert successor.found is not None
+    assert successor.found.first.index == 30
 
 
 def test_what_was_said_of_the_first_object_does_not_go_for_another() -> None:
@@ -241,6 +224,6 @@ def test_what_was_said_of_the_first_object_does_not_go_for_another() -> None:
     config = Run(
         "v.mp4", rest_shape="m.obj", ground_truth=Path("g.npz"), texture=Path("t.png"), roi=(1, 2, 3, 4), output=output
     )
-    other = for_another(config, 3)
+    other = options_for_another(config, 3)
     assert (other.rest_shape, other.ground_truth, other.texture, other.roi) == ("auto", None, None, (1, 2, 3, 4))
     assert other.output == Output(tracks_out=Path("a/t-object3.npz"), image="jpeg")

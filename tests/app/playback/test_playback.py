@@ -272,7 +272,7 @@ def test_real_run(tmp_path: Path, shared_data: Path, image: str) -> None:
         model=Model(bootstrap_frames=8),
         output=Output(out=out, shapes_out=shapes, image=image),  # type: ignore[arg-type]
     )
-    summary = Session(config, Progress()).run()
+    summary = Session(config, Progress()).run().as_dict()
     playback = Playback.load(out)
     assert playback.summary is not None
     assert playback.summary["frames"] == summary["frames"] == 16

@@ -1,0 +1,81 @@
+"""What a run gives, frame by frame: in the source's order, each frame once its shape is known."""
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction.settings import Metric
+from reconstruction.window.model import Model, ShapeEstimate
+from tracking.klt import Observation
+from tracking.video import Frame
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What is followed, once it has a model.
+
+    Attributes:
+        first: the frame it was first seen in.
+        points_px: (P, 2) its vertices in that frame.
+        model: rest shape, mesh, modes and camera.
+        metric: the dissimilarity its modes come from.
+    """
+
+    first: Frame
+    points_px: NDArray[np.float64]
+    model: Model
+    metric: Metric
+
+
+@dataclass(frozen=True)
+class Processed:
+    """A frame and what is known of it.
+
+    Attributes:
+        frame: the picture, its number and its time.
+        observation: the points tracked in it.
+        estimate: its shape; None where the surface was lost, or never had a model.
+        surface: what the estimate is of: the same object until another surface is followed; None before there is a model.
+    """
+
+    frame: Frame
+    observation: Observation
+    estimate: ShapeEstimate | None
+    surface: Surface | None
+
+
+class InOrder:
+    """Frames that wait for their shapes, and those that are ready.
+
+    Attributes:
+        wanted: whether anybody wants them; else none is kept.
+    """
+
+    def __init__(self) -> None:
+        self.wanted = True
+        self._waiting: deque[tuple[Frame, Observation]] = deque()
+        self._ready: deque[Processed] = deque()
+
+    def add(self, frame: Frame, observation: Observation) -> None:
+        """A frame that has no shape yet."""
+        if self.wanted:
+            self._waiting.append((frame, observation))
+
+    def shape(self, index: int, estimate: ShapeEstimate, surface: Surface | None) -> None:
+        """The shape of the frame of that index; those before it will have none."""
+        while self._waiting and self._waiting[0][0].index <= index:
+            frame, observation = self._waiting.popleft()
+            self._ready.append(Processed(frame, observation, estimate if frame.index == index else None, surface))
+
+    def end(self, surface: Surface | None) -> None:
+        """No more shapes for those that wait."""
+        while self._waiting:
+            self._ready.append(Processed(*self._waiting.popleft(), None, surface))
+
+    def ready(self) -> Iterator[Processed]:
+        """Those that are ready, each once."""
+        while self._ready:
+            yield self._ready.popleft()

@@ -1,0 +1,127 @@
+"""What came out of a run, for people and programs."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, fields
+from pathlib import Path
+
+from app.pipeline.counts import Counts
+from app.pipeline.estimates import score_words
+from app.pipeline.stopwatch import Stopwatch
+from app.pipeline.tracked_object import TrackedObject
+from reconstruction.evaluation import Score
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSummary:
+    """Counts of the whole run, and what came out for one object; what has a default may be unknown, and is left out then.
+
+    Attributes:
+        source: the video.
+        frames: so many were processed.
+        interrupted: whether it ended before the video did.
+        points: vertices of the mesh.
+        rest_shape: how it was found; None without one.
+        rest_shape_note: the same in words.
+        bootstrap_frames: frames it comes from.
+        deformation: constraint in force.
+        metric: dissimilarity the modes come from.
+        priors: weights in force.
+        focal_px: focal length; None for an orthographic camera.
+        focal_note: how it was found.
+        branch_switches: how often the window took another branch.
+        reprojection_rms_px: over all visible points of all frames.
+        score: errors against the truth.
+        visible_share: of the points, mean over the frames.
+        visible_share_last: in the last frame.
+        objects: followed one after another.
+        losses: how often the surface was lost, and
+        recoveries: found again.
+        frames_lost: frames without it.
+        fps: frames processed a second.
+        stage_ms: mean milliseconds a frame, by stage.
+        recording: the first file written.
+        parts: number of files, if there are several.
+        last_part: the last of them.
+    """
+
+    source: str
+    frames: int
+    interrupted: bool
+    points: int
+    rest_shape: str | None
+    rest_shape_note: str | None
+    bootstrap_frames: int
+    deformation: str
+    metric: str | None
+    priors: Mapping[str, float]
+    focal_px: float | None
+    focal_note: str | None = None
+    branch_switches: int
+    reprojection_rms_px: float | None
+    score: Score | None = None
+    visible_share: float | None
+    visible_share_last: float | None
+    objects: int
+    losses: int
+    recoveries: int
+    frames_lost: int
+    fps: float
+    stage_ms: Mapping[str, float]
+    recording: Path | None = None
+    parts: int | None = None
+    last_part: Path | None = None
+
+    def as_dict(self) -> dict[str, object]:
+        """Names and values as they are printed and recorded."""
+        words: dict[str, object] = {}
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, Score):
+                words |= score_words(value)
+            elif value is not None or field.default is MISSING:
+                words[field.name] = str(value) if isinstance(value, Path) else value
+        return words
+
+
+def summary_of(
+    source: str,
+    tracked: TrackedObject,
+    counts: Counts,
+    watch: Stopwatch,
+    *,
+    elapsed_s: float,
+    interrupted: bool,
+    recordings: Sequence[Path | None],
+) -> RunSummary:
+    """The summary of a run that took so long, and of one of its objects."""
+    reconstruction, collected = tracked.reconstruction, tracked.collected
+    rest, camera = reconstruction.rest, reconstruction.camera
+    several = recordings[0] is not None and len(recordings) > 1
+    return RunSummary(
+        source=source,
+        frames=counts.frames,
+        interrupted=interrupted,
+        points=len(tracked.points_px),
+        rest_shape=rest.kind if rest else None,
+        rest_shape_note=rest.note if rest else None,
+        bootstrap_frames=reconstruction.bootstrap_frames,
+        deformation=reconstruction.deformation,
+        metric=reconstruction.metric,
+        priors=reconstruction.weights,
+        focal_px=camera.focal_px if camera.perspective else None,
+        focal_note=reconstruction.focal_note or None,
+        branch_switches=collected.switches,
+        reprojection_rms_px=collected.reprojection_rms_px,
+        score=tracked.score,
+        visible_share=counts.visible_share,
+        visible_share_last=counts.visible_share_last,
+        objects=counts.objects,
+        losses=counts.losses,
+        recoveries=counts.recoveries,
+        frames_lost=counts.frames_lost,
+        fps=counts.frames / elapsed_s,
+        stage_ms={stage: total / max(counts.frames, 1) for stage, total in watch.total.items()},
+        recording=recordings[0],
+        parts=len(recordings) if several else None,
+        last_part=recordings[-1] if several else None,
+    )
