@@ -13,7 +13,7 @@ from tracking.klt import Observation
 from tracking.video import Frame
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surface:
     """What is followed, once it has a model.
 
@@ -30,7 +30,7 @@ class Surface:
     metric: Metric
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Processed:
     """A frame and what is known of it.
 
