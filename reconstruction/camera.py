@@ -3,9 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from reconstruction.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -57,18 +56,18 @@ SANDWICH = np.einsum("ikm,nmj,j->ijkn", LEFT, LEFT, CONJUGATE)[:, :, 1:, 1:].res
 
 def left_matrix(q: Array) -> Array:
     """Matrices (..., 4, 4) that multiply by the quaternions (..., 4) from the left."""
-    return np.asarray((q @ LEFT.reshape(4, 16)).reshape(*q.shape, 4))
+    return (q @ LEFT.reshape(4, 16)).reshape(*q.shape, 4)
 
 
 def quaternion_product(a: Array, b: Array) -> Array:
     """Hamilton product (..., 4) of quaternions (..., 4), w first: R(ab) = R(a) R(b)."""
-    return np.asarray((left_matrix(a) @ b[..., None])[..., 0])
+    return (left_matrix(a) @ b[..., None])[..., 0]
 
 
 def rotation_from_quaternion(q: Array) -> Array:
     """Rotations (..., 3, 3) of unit quaternions (..., 4), w first."""
     squares = (q[..., :, None] * q[..., None, :]).reshape(*q.shape[:-1], 16)
-    return np.asarray((squares @ SANDWICH).reshape(*q.shape[:-1], 3, 3))
+    return (squares @ SANDWICH).reshape(*q.shape[:-1], 3, 3)
 
 
 def quaternion_exp(theta: Array) -> Array:
@@ -89,7 +88,7 @@ def quaternion_from_rotation(R: Array) -> Array:
             [yx - xy, zx + xz, zy + yz, zz - xx - yy],
         ]
     )
-    q: Array = np.linalg.eigh(np.moveaxis(N, (0, 1), (-2, -1)))[1][..., -1]
+    q = np.linalg.eigh(np.moveaxis(N, (0, 1), (-2, -1)))[1][..., -1]
     return np.where(q[..., :1] < 0, -q, q)
 
 
@@ -98,5 +97,10 @@ def nearest_rotation(M: Array) -> Array:
     U, _, Vt = np.linalg.svd(M)
     sign = np.linalg.det(U @ Vt)
     U = np.concatenate([U[..., :2], U[..., 2:] * sign[..., None, None]], axis=-1)
-    R: Array = U @ Vt
-    return R
+    return U @ Vt
+
+
+def tilt_axes(directions: int = 4) -> Array:
+    """(n, 3) unit rotation axes in the image plane, evenly spread."""
+    angle = 2 * np.pi * np.arange(directions) / directions
+    return np.stack([np.cos(angle), np.sin(angle), np.zeros(directions)], axis=1)

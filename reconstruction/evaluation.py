@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import Mesh, locate
 from reconstruction.camera import nearest_rotation
-
-Array = NDArray[np.float64]
 
 MIRROR = np.diag([1.0, 1.0, -1.0])
 
@@ -34,11 +32,11 @@ class Score:
     e3d_static: float
     e3d_sign_free: float
     per_frame: Array
-    frames: NDArray[np.int64]
+    frames: Indices
     points: int
 
 
-def score(shapes: Array, rest: Array, truth: Array, frames: NDArray[np.int64]) -> Score:
+def score(shapes: Array, rest: Array, truth: Array, frames: Indices) -> Score:
     """Compare shapes (K, 3, n) and the rest shape (3, n) with the true shapes (K, 3, n) of the given frames (K,)."""
     per_frame = e3d(shapes, truth)
     still = np.broadcast_to(rest, truth.shape)
@@ -70,12 +68,12 @@ def e3d(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = F
     for S in candidates:
         S = S * ((S * truth).sum() / (S * S).sum())
         errors.append(np.linalg.norm(S - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2)))
-    return np.asarray(min(errors, key=lambda error: float(error.mean())))
+    return min(errors, key=lambda error: float(error.mean()))
 
 
 def followed(
     shapes: Sequence[Array], projections: Sequence[Array], rest: Array, mesh: Mesh, truth_px: Array
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+) -> tuple[Array, Array, Mask]:
     """Where truth points seen at truth_px (n, 2) in the first truth frame are on the moving mesh.
 
     Args:
@@ -98,7 +96,7 @@ def followed(
     corners, weights = mesh.faces[face[inside]], weights[inside]
 
     def at(S: Array) -> Array:
-        return np.asarray(np.einsum("dnk,nk->dn", S[:, corners], weights))
+        return np.einsum("dnk,nk->dn", S[:, corners], weights)
 
     return np.stack([at(S) for S in shapes]), at(rest), inside
 
@@ -109,19 +107,19 @@ def with_noise(W: Array, level: float, rng: np.random.Generator) -> Array:
     centroid = W.sum(axis=2, where=seen, keepdims=True) / np.maximum(seen.sum(axis=2, keepdims=True), 1)
     distance = np.linalg.norm(W - centroid, axis=1)
     sigma = level * float(distance.max(initial=0.0, where=seen.all(axis=1)))
-    return np.asarray(W + rng.normal(0.0, sigma, W.shape))
+    return W + rng.normal(0.0, sigma, W.shape)
 
 
-def with_missing(visible: NDArray[np.bool_], share: float, rng: np.random.Generator) -> NDArray[np.bool_]:
-    """Visibility (F, p) with a share of its entries hidden uniformly at random."""
+def with_missing(visible: Mask, share: float, rng: np.random.Generator) -> Mask:
+    """Mask (F, p) with a share of its entries hidden uniformly at random."""
     return visible & (rng.random(visible.shape) >= share)
 
 
-def with_outliers(W: Array, visible: NDArray[np.bool_], share: float, rng: np.random.Generator) -> Array:
+def with_outliers(W: Array, visible: Mask, share: float, rng: np.random.Generator) -> Array:
     """Observations (F, 2, p) of which a share lies anywhere in the bounding box of what is visible (F, p)."""
     gross = visible & (rng.random(visible.shape) < share)
     if not gross.any():
         return W
     seen = W.transpose(0, 2, 1)[visible]
     low, high = seen.min(axis=0)[:, None], seen.max(axis=0)[:, None]
-    return np.asarray(np.where(gross[:, None], rng.uniform(low, high, W.shape), W))
+    return np.where(gross[:, None], rng.uniform(low, high, W.shape), W)

@@ -4,25 +4,24 @@ from dataclasses import replace
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError
-from reconstruction.basis.distances import fitting
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis import constraints, distances
 from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.model import Model, build_model
+from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
+from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping import focal, rest_shape
+from reconstruction.mapping.evidence import TURN_DEGREES, weigh
 from reconstruction.mapping.factorization import view_turn_degrees
 from reconstruction.mapping.outliers import without_outliers
-from reconstruction.mapping.rest_shape import TURN_DEGREES, RestShape
 from reconstruction.settings import Deformation, Metric, Settings
 from reconstruction.window import priors
-from reconstruction.window.constraints import build_energy, build_guides, chosen
-from reconstruction.window.model import Model, ShapeEstimate, build_model
+from reconstruction.window.energy import build_energy, build_guides
 from reconstruction.window.priors import Weights
 from reconstruction.window.window import SlidingWindow
-
-Array = NDArray[np.float64]
-Visibility = NDArray[np.bool_]
 
 BOOTSTRAP_SCHEDULE = (10, 15, 20, 30, 45, 60)  # frames after which a rigid shape is looked for; the last decides
 
@@ -66,7 +65,7 @@ class Reconstruction:
         self.metric: Metric | None = None
         self.deformation: Deformation = settings.deformation
         self.focal_note = ""
-        self._waiting: list[tuple[Array, Visibility]] = []
+        self._waiting: list[tuple[Array, Mask]] = []
 
     @property
     def phase(self) -> Phase:
@@ -98,7 +97,7 @@ class Reconstruction:
         """Where the next frame will see the points, (p, 2) px at constant velocity; None while bootstrapping."""
         return None if self.window is None else self.window.predict()
 
-    def update(self, W: Array, visible: Visibility) -> list[ShapeEstimate]:
+    def update(self, W: Array, visible: Mask) -> list[ShapeEstimate]:
         """Take one frame's points (2, p) px with visibility (p,); returns the shapes now known, oldest first.
 
         Raises:
@@ -139,7 +138,7 @@ class Reconstruction:
             return self._recover("rigid", W, visible)
         doubt = "there are too few frames for a rigid shape"
         if len(W) >= BOOTSTRAP_SCHEDULE[0]:
-            doubt = rest_shape.weigh(W, visible).doubt
+            doubt = weigh(W, visible).doubt
             if not doubt:
                 rest = rest_shape.rigid(W, visible, self.camera)
                 turn = view_turn_degrees(rest.motion.R)
@@ -154,7 +153,7 @@ class Reconstruction:
         return self._recover("plane", W, visible, f" (no rigid shape: {doubt})")
 
     def _recover(
-        self, kind: str, W: Array, visible: Visibility, remark: str = "", rest: RestShape | None = None
+        self, kind: str, W: Array, visible: Mask, remark: str = "", rest: RestShape | None = None
     ) -> list[ShapeEstimate]:
         """The rest shape of the first frames (F, 2, p), if it is not there yet, by the focal length that they hold."""
         recovery = rest_shape.rigid if kind == "rigid" else rest_shape.plane
@@ -168,8 +167,8 @@ class Reconstruction:
 
     def _start(self, rest: RestShape) -> list[ShapeEstimate]:
         self.rest, self.bootstrap_frames = rest, len(self._waiting)
-        self.deformation = chosen(self.deformation, rest)
-        self.metric = fitting(self.settings.metric, flat=rest.flat)
+        self.deformation = constraints.fitting(self.deformation, flat=rest.flat)
+        self.metric = distances.fitting(self.settings.metric, flat=rest.flat)
         model = build_model(rest, self.camera, self.settings.modes, self.metric, self._mesh)
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)

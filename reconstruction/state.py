@@ -7,11 +7,9 @@ A window of n frames holds q, t, log s and Λ' = Λ/√p per frame. A frame's d 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from reconstruction.camera import quaternion_exp, quaternion_product, rotation_from_quaternion
-
-Array = NDArray[np.float64]
+from reconstruction.arrays import Array
+from reconstruction.camera import CONJUGATE, quaternion_exp, quaternion_product, rotation_from_quaternion
 
 POSE = 6  # θ, t, log s
 
@@ -62,3 +60,9 @@ def join(states: list[State]) -> State:
     """One state of all frames, in order."""
     fields = ("q", "t", "log_s", "Lambda")
     return State(*(np.concatenate([getattr(s, name) for s in states]) for name in fields))
+
+
+def extrapolated(earlier: State, last: State) -> State:
+    """One frame further at constant velocity."""
+    turned = quaternion_product(last.q, quaternion_product(earlier.q * CONJUGATE, last.q))
+    return State(turned, 2 * last.t - earlier.t, 2 * last.log_s - earlier.log_s, 2 * last.Lambda - earlier.Lambda)

@@ -13,7 +13,7 @@ from app.recording.recording import Recording
 from reconstruction.basis.mesh import Mesh, triangulate
 from reconstruction.basis.modes import ModalBasis, modal_basis
 from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
-from reconstruction.window.model import ShapeEstimate
+from reconstruction.estimate import ShapeEstimate
 from tracking.klt import Observation
 from tracking.video import Frame
 

@@ -35,7 +35,7 @@ ARROWS = {
     "tracking": set(),
     "reconstruction.shared": set(),
     "reconstruction.basis": set(),
-    "reconstruction.window": {"reconstruction.basis", "reconstruction.mapping"},
+    "reconstruction.window": {"reconstruction.basis"},
     "reconstruction.mapping": {"reconstruction.basis", "reconstruction.window"},
     "reconstruction.evaluation": {"reconstruction.basis"},
     "reconstruction.online": {"reconstruction.basis", "reconstruction.window", "reconstruction.mapping"},

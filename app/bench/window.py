@@ -8,7 +8,7 @@ import numpy as np
 from app.bench.timing import growth, least_s
 from app.rivals.problems import WindowStep, full_model, summed, window_step
 from app.terminal.errors import UsageError
-from reconstruction.window.marginal import Past
+from reconstruction.window.marginal import Previous
 from reconstruction.window.solver import Solution, Solver, minimise
 from reconstruction.window.statistics import stack
 
@@ -78,7 +78,9 @@ def timings(*, quick: bool, say: Say) -> list[Timing]:
 def iterations(step: WindowStep) -> Callable[[], Solution]:
     """Four iterations of a step whose points are summed up."""
     data = stack([step.settled, summed(step.B, step.W[-1], step.focal)])
-    return lambda: minimise(step.energy, data, step.start, Past(step.before), Solver(iterations=ITERATIONS, tolerance=0.0))
+    return lambda: minimise(
+        step.energy, data, step.start, Previous(step.before), Solver(iterations=ITERATIONS, tolerance=0.0)
+    )
 
 
 def timed(step: WindowStep, deformation: str, iterations_s: float) -> Timing:
@@ -103,7 +105,7 @@ def timed(step: WindowStep, deformation: str, iterations_s: float) -> Timing:
 def solved(step: WindowStep, solver: Solver) -> Solution:
     """What a run does for a new frame."""
     data = stack([step.settled, summed(step.B, step.W[-1], step.focal)])
-    return minimise(step.energy, data, step.start, Past(step.before), solver)
+    return minimise(step.energy, data, step.start, Previous(step.before), solver)
 
 
 def races(*, quick: bool, say: Say) -> Iterator[Race]:

@@ -14,7 +14,8 @@ from app.recording.modes_figure import modes_figure, spectrum, title_of
 from app.terminal.progress import Progress
 from reconstruction.basis.distances import fitting
 from reconstruction.basis.mesh import Mesh
-from reconstruction.basis.modes import ModalBasis, is_flat
+from reconstruction.basis.modes import ModalBasis
+from reconstruction.basis.rest_shape import is_flat
 from reconstruction.settings import Metric, MetricChoice
 
 

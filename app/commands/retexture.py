@@ -22,7 +22,8 @@ from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
-from reconstruction.window.model import Model, ShapeEstimate
+from reconstruction.basis.model import Model
+from reconstruction.estimate import ShapeEstimate
 from tracking.klt import Observation
 from tracking.video import Frame
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from app.terminal.errors import UsageError
 from reconstruction import ReconstructionError
+from reconstruction.basis import rest_shape
 from reconstruction.basis.mesh import Mesh, locate, mesh_from_faces
+from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
-from reconstruction.mapping import rest_shape
-from reconstruction.mapping.rest_shape import RestShape
 
 Array = NDArray[np.float64]
 

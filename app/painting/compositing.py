@@ -14,7 +14,7 @@ from app.painting.picture import Box, Pyramid
 from app.painting.raster import Rasteriser, SurfaceMap
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
-from reconstruction.window.model import Model
+from reconstruction.basis.model import Model
 
 ROUNDS = 20  # of diffusing the points' offsets from the shape over their neighbours
 OUTLIER_PX = 1.5  # a point whose offset differs from its neighbours' by this counts half

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from app.files.writing import writable
 from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.model import Model
+from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import Score, followed, score
-from reconstruction.window.model import Model, ShapeEstimate
 from tracking.tracks import Truth
 
 Array = NDArray[np.float64]

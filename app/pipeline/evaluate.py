@@ -14,11 +14,11 @@ from app.pipeline.estimates import Collected, save_shapes, score_words
 from app.pipeline.prepare import RECOVERED, settings_of
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
+from reconstruction.basis import rest_shape
 from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.evaluation import score, with_missing, with_noise, with_outliers
-from reconstruction.mapping import rest_shape
-from reconstruction.mapping.rest_shape import RestShape
 from reconstruction.online import Reconstruction
 from tracking.tracks import Tracks
 

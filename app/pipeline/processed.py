@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from reconstruction.basis.model import Model
+from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
-from reconstruction.window.model import Model, ShapeEstimate
 from tracking.klt import Observation
 from tracking.video import Frame
 

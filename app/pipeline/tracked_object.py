@@ -9,9 +9,9 @@ from app.pipeline.estimates import Collected, save_shapes
 from app.pipeline.prepare import prepared
 from app.pipeline.processed import Surface
 from app.pipeline.stopwatch import Stopwatch
+from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import Score
 from reconstruction.online import Phase
-from reconstruction.window.model import ShapeEstimate
 from tracking.guarded import Change, Guarded, GuardedTracker
 from tracking.klt import Observation
 from tracking.tracks import Tracks, Truth

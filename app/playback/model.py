@@ -9,9 +9,9 @@ from app.arrays import Array, Image, Indices
 from app.playback.chunks import Rows
 from app.recording import entities
 from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.model import Model
 from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera
-from reconstruction.window.model import Model
 
 MODEL = "modeshape.Model:"
 TEXTURE = "Mesh3D:albedo_texture_"

@@ -20,10 +20,11 @@ from app.playback.observations import OBSERVATION, POSITIONS, observed_part
 from app.recording import entities
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.model import Model
 from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.estimate import ShapeEstimate
 from reconstruction.state import State
-from reconstruction.window.model import Model, ShapeEstimate
 
 ESTIMATE = "modeshape.Estimate:"
 

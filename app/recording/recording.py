@@ -24,8 +24,8 @@ from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera
+from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
-from reconstruction.window.model import ShapeEstimate
 from tracking.klt import Observation
 from tracking.video import Frame
 

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from reconstruction.basis.constraints import ROWS
 from reconstruction.basis.mesh import Mesh, triangulate
+from reconstruction.basis.model import Model
 from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import Camera, quaternion_exp, quaternion_product
 from reconstruction.state import State, join
-from reconstruction.window.constraints import ROWS
 from reconstruction.window.energy import Energy
-from reconstruction.window.model import Model
 from reconstruction.window.solver import Solver, minimise
 from reconstruction.window.statistics import Statistics, frame_statistics, stack
 

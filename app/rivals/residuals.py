@@ -62,7 +62,7 @@ class FrameData:
 def change_weights(step: WindowStep) -> Array:
     """Roots of the weights on a frame's change (7 + k,): of q, t, log s and the free rows of Λ'."""
     energy, shape = step.energy, (len(step.energy.rows), step.modes)
-    pose = [energy.rotation] * 4 + [energy.translation] * 2 + [energy.scale]
+    pose = [energy.rotation] * 4 + [0.0] * 2 + [energy.scale]
     return np.asarray(np.sqrt(np.concatenate([pose, np.broadcast_to(energy.smoothness, shape).ravel()])))
 
 

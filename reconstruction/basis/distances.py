@@ -3,17 +3,15 @@
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial.distance import cdist, pdist, squareform
 
 from reconstruction import ReconstructionError
+from reconstruction.arrays import Array, Indices
 from reconstruction.basis.mesh import farthest_points
+from reconstruction.basis.rest_shape import rms_radius
 from reconstruction.settings import Metric, MetricChoice
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 THINNEST = 0.03  # variance added to each principal axis, as a share of their mean: a flat sheet has none across
 AWAY_FROM_ZERO = 0.05  # smallest coordinate of the chi-squared distance, in RMS radii: it compares positive numbers
@@ -94,7 +92,7 @@ def chi_squared(rest: Array, to: Indices | None = None) -> Array:
         share *= share
         share /= a[:, None] + b
         squares += share
-    return np.asarray(np.sqrt(0.5 * squares))
+    return np.sqrt(0.5 * squares)
 
 
 def jensen_shannon(rest: Array, to: Indices | None = None) -> Array:
@@ -109,9 +107,4 @@ def jensen_shannon(rest: Array, to: Indices | None = None) -> Array:
 
 def between(points: Array, to: Indices | None, metric: Literal["euclidean", "jensenshannon"] = "euclidean") -> Array:
     """Distances (p, p) between points (p, d), or (p, m) to those of them with the indices `to` (m,)."""
-    return np.asarray(squareform(pdist(points, metric)) if to is None else cdist(points, points[to], metric))
-
-
-def rms_radius(rest: Array) -> float:
-    """RMS distance of the points (3, p) to their centroid."""
-    return float(np.sqrt(rest.var(axis=1).sum()))
+    return squareform(pdist(points, metric)) if to is None else cdist(points, points[to], metric)

@@ -6,15 +6,12 @@ brought to an orthonormal basis of its m columns, its eigenpairs are those of an
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh, pinvh
 
+from reconstruction.arrays import Array, Indices
 from reconstruction.basis.distances import dissimilarity
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.settings import Metric
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 LANDMARKS = 300
 PER_MODE = 5  # at least so many landmarks for each mode

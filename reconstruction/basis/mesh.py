@@ -3,13 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import Delaunay, QhullError
 
 from reconstruction import ReconstructionError
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from reconstruction.arrays import Array, Indices
 
 SLIVER_DEGREES = 5.0  # hull triangles with a smaller angle bridge a dent of the outline and are dropped
 
@@ -30,8 +27,7 @@ class Mesh:
 def unique_edges(faces: Indices) -> Indices:
     """Each edge of the triangles (m, 3) once, as (n, 2) pairs with the smaller index first."""
     pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    edges: Indices = np.unique(np.sort(pairs, axis=1), axis=0)
-    return edges
+    return np.unique(np.sort(pairs, axis=1), axis=0)
 
 
 def mesh_from_faces(faces: Indices) -> Mesh:
@@ -63,7 +59,7 @@ def smallest_angle(points: Array, faces: Indices) -> Array:
     corners = points[faces]
     lengths = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
     a, b, c = np.sort(lengths, axis=1).T
-    return np.asarray(np.arccos(np.clip((b * b + c * c - a * a) / np.maximum(2 * b * c, 1e-300), -1, 1)))
+    return np.arccos(np.clip((b * b + c * c - a * a) / np.maximum(2 * b * c, 1e-300), -1, 1))
 
 
 def farthest_points(points: Array, count: int) -> Indices:
@@ -98,4 +94,4 @@ def locate(points: Array, mesh: Mesh, queries: Array) -> tuple[Indices, Array]:
 
 def cross2(a: Array, b: Array) -> Array:
     """Cross product (n,) of plane vectors (n, 2)."""
-    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

@@ -3,20 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
 from reconstruction import ReconstructionError
+from reconstruction.arrays import Array
 from reconstruction.basis import distances, landmarks
 from reconstruction.basis.mesh import Mesh
 from reconstruction.settings import Metric
 
-Array = NDArray[np.float64]
-
-FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
 EXACT_POINTS = 4000  # with more, modes come from the distances to landmarks: all of D would take minutes and gigabytes
-DEAR_POINTS = 1000  # the same for Jensen-Shannon distances, which take ten times as long
+EXACT_JENSEN_SHANNON = 1000  # the same for Jensen-Shannon distances, which take ten times as long
 
 
 @dataclass(frozen=True)
@@ -37,12 +34,11 @@ class ModalBasis:
 
     def deform(self, Lambda: Array) -> Array:
         """Shape S (..., 3, p) of coefficients Λ (..., 3, r) (Eq. 3)."""
-        return np.asarray(self.rest + self.Phi @ Lambda @ self.Upsilon)
+        return self.rest + self.Phi @ Lambda @ self.Upsilon
 
     def linear_basis(self) -> Array:
         """B (3r, 3, p): the same model as a linear subspace, S = S̄ + Σ_ι φ_ι B_ι with φ = vec Λ row by row (§3.3)."""
-        basis: Array = np.einsum("di,ap->iadp", self.Phi, self.Upsilon).reshape(-1, *self.rest.shape)
-        return basis
+        return np.einsum("di,ap->iadp", self.Phi, self.Upsilon).reshape(-1, *self.rest.shape)
 
 
 def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean") -> ModalBasis:
@@ -66,13 +62,13 @@ def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean
 
 def exact_points(metric: Metric) -> int:
     """Most points whose distances are all computed."""
-    return DEAR_POINTS if metric == "jensen-shannon" else EXACT_POINTS
+    return EXACT_JENSEN_SHANNON if metric == "jensen-shannon" else EXACT_POINTS
 
 
 def doubly_centred(D: Array) -> Array:
     """D̄ = −½ C D C (p, p) of the distance matrix D; D is not squared, so D̄ has p−1 positive eigenvalues (Eq. 2)."""
     row = D.mean(axis=0, keepdims=True)
-    return np.asarray(-0.5 * (D - row - row.T + row.mean()))
+    return -0.5 * (D - row - row.T + row.mean())
 
 
 def leading_eigenpairs(matrix: Array, count: int) -> tuple[Array, Array]:
@@ -96,13 +92,7 @@ def principal_axes(rest: Array) -> Array:
     return Phi
 
 
-def is_flat(rest: Array) -> bool:
-    """Whether a shape (3, p) is a sheet: hardly any relief for its size."""
-    extent = np.linalg.svd(rest - rest.mean(axis=1, keepdims=True), compute_uv=False)
-    return bool(extent[2] < FLAT_RELIEF * extent[0])
-
-
 def with_fixed_signs(vectors: Array) -> Array:
     """Columns with the sign that makes their largest entry positive, so that runs repeat exactly."""
     largest = vectors[np.abs(vectors).argmax(axis=0), np.arange(vectors.shape[1])]
-    return np.asarray(vectors * np.where(largest < 0, -1.0, 1.0))
+    return vectors * np.where(largest < 0, -1.0, 1.0)

@@ -7,12 +7,10 @@ symmetric L = QQᵀ that makes the rows of A^f Q orthogonal and equally long.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError
-from reconstruction.mapping.rigid import RigidMotion
-
-Array = NDArray[np.float64]
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis.rest_shape import RigidMotion
 
 STEADY_SCALE = 0.3  # weight of "the scale stays the same" against "the axes are orthogonal and equally long"
 
@@ -40,7 +38,7 @@ def view_turn_degrees(R: Array) -> float:
     return float(np.rad2deg(np.arccos(np.clip((axes @ axes.T).min(), -1.0, 1.0))))
 
 
-def factorize(W: Array, visible: NDArray[np.bool_]) -> Factorization:
+def factorize(W: Array, visible: Mask) -> Factorization:
     """Factorise observations (F, 2, p) px with visibility (F, p).
 
     The mirror image of a shape explains orthographic views as well; this returns one of the two.
@@ -64,7 +62,7 @@ def factorize(W: Array, visible: NDArray[np.bool_]) -> Factorization:
     return Factorization(RigidMotion(S, R, s, t).in_first_frame(), singular, rms, condition)
 
 
-def affine_structure(W: Array, visible: NDArray[np.bool_], sweeps: int = 100) -> tuple[Array, Array, Array]:
+def affine_structure(W: Array, visible: Mask, sweeps: int = 100) -> tuple[Array, Array, Array]:
     """A (F, 2, 3), t (F, 2), S (3, p) of the affine fit, by alternating least squares over the visible entries.
 
     Raises:
@@ -103,7 +101,7 @@ def weighted_solve(gram: Array, right: Array) -> Array:
     """Solve (n, k, k) systems for right sides (n, m, k), with a touch of damping for entries hardly seen."""
     k = gram.shape[-1]
     damping = 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] / k * np.eye(k)
-    return np.asarray(np.linalg.solve(gram + damping, right.transpose(0, 2, 1)).transpose(0, 2, 1))
+    return np.linalg.solve(gram + damping, right.transpose(0, 2, 1)).transpose(0, 2, 1)
 
 
 def metric_upgrade(A: Array) -> tuple[Array, float]:
@@ -112,7 +110,7 @@ def metric_upgrade(A: Array) -> tuple[Array, float]:
     i, j = np.triu_indices(3)
 
     def form(a: Array, b: Array) -> Array:
-        return np.asarray((a[:, i] * b[:, j] + a[:, j] * b[:, i]) * np.where(i == j, 0.5, 1.0))
+        return (a[:, i] * b[:, j] + a[:, j] * b[:, i]) * np.where(i == j, 0.5, 1.0)
 
     length = form(x, x) + form(y, y)
     size = np.linalg.norm(length, axis=1).mean()
@@ -126,7 +124,7 @@ def metric_upgrade(A: Array) -> tuple[Array, float]:
     condition = float(values[0] / values[2])
     # Where L is not positive definite the nearest usable one is taken; the condition says not to trust it.
     values = np.maximum(values, 1e-3 * values[2])
-    return np.asarray(vectors * np.sqrt(values)), condition
+    return vectors * np.sqrt(values), condition
 
 
 def rotations_from_rows(A: Array) -> Array:

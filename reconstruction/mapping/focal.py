@@ -5,25 +5,24 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis import constraints
+from reconstruction.basis.model import Model, build_model
 from reconstruction.basis.modes import principal_axes
+from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.mapping import rest_shape
-from reconstruction.mapping.rest_shape import RestShape
+from reconstruction.mapping.evidence import judging_points
 from reconstruction.mapping.sheet import sheet
 from reconstruction.settings import Deformation
 from reconstruction.state import join
-from reconstruction.window.constraints import build_energy, chosen
-from reconstruction.window.energy import Energy
-from reconstruction.window.model import Model, build_model
+from reconstruction.window.energy import Energy, build_energy
+from reconstruction.window.robust import robust_weights
 from reconstruction.window.solver import Solver, minimise
-from reconstruction.window.statistics import stack
-from reconstruction.window.window import SlidingWindow, robust_weights
-
-Array = NDArray[np.float64]
-Visibility = NDArray[np.bool_]
+from reconstruction.window.statistics import image_statistics, stack
+from reconstruction.window.window import SlidingWindow
 
 FEWEST = 10  # frames; fewer show too little turn
 FRAMES = 12  # of them, spread, are enough to compare by
@@ -55,7 +54,7 @@ class FocalEstimate:
 
 def estimate(
     W: Array,
-    visible: Visibility,
+    visible: Mask,
     camera: Camera,
     rest: RestShape,
     deformation: Deformation,
@@ -73,7 +72,7 @@ def estimate(
     """
     if len(W) < FEWEST:
         return FocalEstimate(camera.focal_px, False, assumed(camera.focal_px, f"{len(W)} frames are too few to tell"))
-    points = rest_shape.judging_points(W, visible)
+    points = judging_points(W, visible)
     frames = np.unique(np.linspace(0, len(W) - 1, FRAMES).astype(int))
     motion = replace(rest.motion, shape=rest.motion.shape[:, points])
     W, visible, rest = W[frames][:, :, points], visible[frames][:, points], replace(rest, motion=motion)
@@ -96,14 +95,14 @@ class Trials:
     def __init__(
         self,
         W: Array,
-        visible: Visibility,
+        visible: Mask,
         camera: Camera,
         rest: RestShape,
         deformation: Deformation,
         priors: Mapping[str, float] | None,
     ) -> None:
         self._W, self._visible, self._rest, self._camera, self._priors = W, visible, rest, camera, priors
-        self._deformation = chosen(deformation, rest)
+        self._deformation = constraints.fitting(deformation, flat=rest.flat)
         self._axes = {camera.focal_px: principal_axes(rest.motion.shape)}
         model, energy = self._problem(camera.focal_px)
         window = SlidingWindow(model, energy, WINDOW, rest.motion)
@@ -118,7 +117,7 @@ class Trials:
     def cost(self, focal_px: float) -> float:
         """Least energy of all frames together under a focal length, mean over frames."""
         model, energy = self._problem(focal_px)
-        data = stack([model.statistics(w, weights) for w, weights in zip(self._W, self._weights, strict=True)])
+        data = stack([image_statistics(model, w, weights) for w, weights in zip(self._W, self._weights, strict=True)])
         nearest = min(self._solved, key=lambda other: abs(np.log(other / focal_px)))
         found = minimise(energy, data, self._solved[nearest], None, Solver())
         self._solved[focal_px] = found.state

@@ -7,28 +7,24 @@ first of rank 2, all that a flat sheet does, since a third direction fitted at o
 from itertools import combinations_with_replacement
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-Array = NDArray[np.float64]
-Visibility = NDArray[np.bool_]
+from reconstruction.arrays import Array, Mask
+from reconstruction.window.robust import LEAST_SIGMA, deviation, fit_weights, lengths
 
-LEAST_SIGMA = 0.02  # of the surface's size: less is what any surface deforms by
 GROSS_SIGMAS = 6.0  # deviations beyond which an entry may be an outlier
-CLOSE_SIGMAS = 2.0  # deviations beyond which an entry hardly counts at the end
 DISAGREEING_SIGMAS = 4.0  # deviations beyond which an entry speaks against a place, how far ever it is off
 NEIGHBOURS = 8  # of a point: a part of the surface that moves by itself takes them along
 FLAT_SWEEPS, SOLID_SWEEPS, CLOSE_SWEEPS = 8, 12, 8
 SETTLED = 1e-3  # change of all deviations after which no further sweep is needed
-BROAD_FITS, CLOSE_FITS = 5, 3  # of the motion of one frame
 MANY_FAR = 0.3  # of a point's entries
 FAR_OUT = 12.0  # squared distance from the middle, in variances of a coordinate
 PAIRED_FRAMES = 10  # of a point, at most, that are tried two by two
 FEWEST_POINTS, FEWEST_FRAMES = 4, 1  # to be left of a frame, of a point; else it keeps all its entries
 
 
-def without_outliers(W: Array, visible: Visibility) -> Visibility:
-    """Visibility (F, p) of observations (F, 2, p) px less the entries that are grossly wrong."""
+def without_outliers(W: Array, visible: Mask) -> Mask:
+    """Visibility (F, p) of observations (F, 2, p) px without the entries that are grossly wrong."""
     fit = RobustFit(W, visible)
     fit.sweep(1)
     if not fit.gross().any():  # tracks that were checked: nothing more to do
@@ -58,7 +54,7 @@ class RobustFit:
         visible: (F, p).
     """
 
-    def __init__(self, W: Array, visible: Visibility) -> None:
+    def __init__(self, W: Array, visible: Mask) -> None:
         seen = np.where(visible[:, None], W, np.nan)
         middle = medians(seen, axis=2)[:, :, None]
         track = np.nan_to_num(medians(seen - middle, axis=0))
@@ -73,7 +69,7 @@ class RobustFit:
         """Improve A, t and S, at most so often; `close` all but leaves out what is far off, else it counts linearly."""
         for _ in range(times):
             before = self._off.sum()
-            h = self._h * weights(self._off / self._sigma, close=close)
+            h = self._h * fit_weights(self._off / self._sigma, close=close)
             A, t = self._motion(h)
             S = self._points(A, t, h)
             self._judge(self._known - A @ S - t)
@@ -83,7 +79,7 @@ class RobustFit:
 
     def deepen(self) -> None:
         """Another row of S: what the points do most of what is not explained so far."""
-        left = self._left * weights(self._off / self._sigma, close=False)[:, None]
+        left = self._left * fit_weights(self._off / self._sigma, close=False)[:, None]
         direction = np.linalg.svd(left.reshape(-1, left.shape[2]), full_matrices=False)[2][:1]
         self._S = np.concatenate([self._S, standardised(direction)])
 
@@ -95,7 +91,7 @@ class RobustFit:
         far = self._visible & (self._off > GROSS_SIGMAS * self._sigma)
         seen = self._visible.sum(axis=0)
         doubtful = (far.sum(axis=0) > MANY_FAR * seen) | ((self._S**2).sum(axis=0) > FAR_OUT)
-        A, t = self._motion(self._h * weights(self._off / self._sigma, close=True))
+        A, t = self._motion(self._h * fit_weights(self._off / self._sigma, close=True))
         left = self._left.copy()
         for i in np.flatnonzero(doubtful & (seen > 0)):
             frames = np.flatnonzero(self._visible[:, i])
@@ -107,13 +103,13 @@ class RobustFit:
             S = np.linalg.solve(gram, two.transpose(0, 2, 1) @ places)[:, :, 0]
             S = np.concatenate([S, self._S[None, :, i]])
             tried = place[:, :, None] - rows @ S.T  # (frames, 2, pairs)
-            cost = (np.minimum(length(tried) / self._sigma, DISAGREEING_SIGMAS) ** 2).sum(axis=0) + (S**2).sum(axis=1)
+            cost = (np.minimum(lengths(tried) / self._sigma, DISAGREEING_SIGMAS) ** 2).sum(axis=0) + (S**2).sum(axis=1)
             best = int(cost.argmin())
             self._S[:, i] = S[best]
             left[frames, :, i] = tried[:, :, best]
         self._judge(left)
 
-    def gross(self) -> Visibility:
+    def gross(self) -> Mask:
         """Which entries (F, p) are off by far, and not together with their neighbours."""
         limit = GROSS_SIGMAS * self._sigma
         off = self._visible & (self._off > limit)
@@ -121,13 +117,13 @@ class RobustFit:
         beside = self._neighbours[i]
         around = np.where(self._visible[f[:, None], beside], self._left[f[:, None], :, beside].transpose(2, 0, 1), np.nan)
         alone = self._left[f, :, i].T - np.nan_to_num(medians(around, axis=2))
-        off[f, i] = length(alone) > limit
+        off[f, i] = lengths(alone) > limit
         return off
 
     def _judge(self, left: Array) -> None:
         self._left = left * self._h[:, None]
-        self._off = length(self._left)
-        self._sigma = usual(self._off[self._visible], LEAST_SIGMA * self._size)
+        self._off = lengths(self._left)
+        self._sigma = deviation(self._off[self._visible], LEAST_SIGMA * self._size)
 
     def _motion(self, h: Array) -> tuple[Array, Array]:
         """A (F, 2, k) and t (F, 2, 1) given S."""
@@ -146,61 +142,18 @@ class RobustFit:
         both = products(rows.T).reshape(k * k, -1, 2).sum(axis=2)  # (k², F)
         gram = (both @ h).T.reshape(-1, k, k) + self._sigma**2 * np.eye(k)
         right = rows.T @ ((self._known - t) * h[:, None]).reshape(len(rows), -1)
-        return np.asarray(np.linalg.solve(gram, right.T[:, :, None])[:, :, 0].T)
-
-
-def off_the_common_motion(shape: Array, W: Array, visible: NDArray[np.bool_], limit: float) -> Array:
-    """What the affine motion of a shape (3, p) that most of the points (2, p) take part in leaves of them: (2, p) px.
-
-    Args:
-        shape: (3, p) px, seen along its third axis.
-        W: (2, p) px; anything where not visible.
-        visible: (p,), at least one.
-        limit: deviations beyond which a point might spoil the motion; where there is none, no closer look is taken.
-    """
-    B = np.concatenate([shape, np.ones((1, shape.shape[1]))])[:, visible]
-    known = W[:, visible]
-    least = LEAST_SIGMA * float(np.sqrt(np.var(shape, axis=1).sum()))
-    left = known - B[:2]
-    left = left - np.median(left, axis=1)[:, None]
-    for k in range(BROAD_FITS + CLOSE_FITS):
-        off = length(left)
-        sigma = usual(off, least)
-        if k in (0, BROAD_FITS) and off.max() <= limit * (sigma if k else least):
-            break
-        weighted = B * weights(off / sigma, close=k >= BROAD_FITS)
-        gram = weighted @ B.T
-        gram += 1e-9 * np.trace(gram) * np.eye(4)
-        left = known - np.linalg.solve(gram, weighted @ known.T).T @ B
-    residuals = np.zeros_like(W)
-    residuals[:, visible] = left
-    return residuals
-
-
-def usual(off: Array, least: float) -> float:
-    """Deviation in one coordinate of vectors of these lengths (n,), at least so much."""
-    return max(float(np.median(off)) / 1.1774, least)  # median of a Rayleigh distribution
-
-
-def weights(off: Array, *, close: bool) -> Array:
-    """Weights of entries so many deviations off: Geman-McClure's, or those that make far ones count linearly."""
-    return np.asarray(1 / (1 + (off / CLOSE_SIGMAS) ** 2) ** 2 if close else 1 / (1 + off))
+        return np.linalg.solve(gram, right.T[:, :, None])[:, :, 0].T
 
 
 def products(vectors: Array) -> Array:
     """The products (k², n) of all pairs of rows (k, n)."""
-    return np.asarray((vectors[:, None] * vectors).reshape(-1, vectors.shape[1]))
-
-
-def length(vectors: Array) -> Array:
-    """Lengths (..., p) of vectors (..., 2, p)."""
-    return np.asarray(np.sqrt(vectors[..., 0, :] ** 2 + vectors[..., 1, :] ** 2))
+    return (vectors[:, None] * vectors).reshape(-1, vectors.shape[1])
 
 
 def standardised(S: Array) -> Array:
     """Rows of mean 0 and variance 1."""
     S = S - S.mean(axis=1, keepdims=True)
-    return np.asarray(S / S.std(axis=1, keepdims=True).clip(1e-12))
+    return S / S.std(axis=1, keepdims=True).clip(1e-12)
 
 
 def medians(x: Array, axis: int) -> Array:

@@ -1,58 +1,23 @@
 """Rigid bundle adjustment: poses by Levenberg-Marquardt, points by least squares, in turn, with the exact camera."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis.rest_shape import RigidMotion, rms_radius
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.state import State
-from reconstruction.window.energy import Energy
-from reconstruction.window.priors import ORTHOGRAPHIC_SCALE, PERSPECTIVE_SCALE
+from reconstruction.window.energy import Energy, pose_energy
 from reconstruction.window.solver import Solver, minimise
 from reconstruction.window.statistics import Statistics, pose_statistics
-
-Array = NDArray[np.float64]
-Visibility = NDArray[np.bool_]
 
 POSES = Solver(iterations=10, tolerance=1e-4)
 
 
-@dataclass(frozen=True)
-class RigidMotion:
-    """A rigid shape and how it is seen in F frames.
-
-    Attributes:
-        shape: (3, p) centred.
-        R: (F, 3, 3) rotations.
-        s: (F,) scales.
-        t: (F, 2) image of the shape's origin relative to the principal point, px.
-    """
-
-    shape: Array
-    R: Array
-    s: Array
-    t: Array
-
-    def in_first_frame(self) -> "RigidMotion":
-        """The same in camera axes and pixels of the first frame: R[0] = 1, s[0] = 1."""
-        return replace(self, shape=self.s[0] * self.R[0] @ self.shape, R=self.R @ self.R[0].T, s=self.s / self.s[0])
-
-    def mirrored(self) -> "RigidMotion":
-        """Depth reversed: explains orthographic views as well."""
-        flip = np.diag([1.0, 1.0, -1.0])
-        return replace(self, shape=flip @ self.shape, R=flip @ self.R @ flip)
-
-
-def pose_energy(camera: Camera, tied: bool = False) -> Energy:
-    """The energy of a rigid shape's poses."""
-    scale = PERSPECTIVE_SCALE if camera.perspective else ORTHOGRAPHIC_SCALE
-    return Energy(rows=(), rest=0.0, rotation=1e-3, scale=scale, tied=tied)
-
-
 def bundle_adjust(
     W: Array,
-    visible: Visibility,
+    visible: Mask,
     motion: RigidMotion,
     camera: Camera,
     *,
@@ -94,8 +59,8 @@ def adjust_poses(W: Array, h: Array, motion: RigidMotion, camera: Camera, energy
     return motion, float(found.value.sum())
 
 
-def follow(W: Array, visible: Visibility, starts: list[RigidMotion], camera: Camera) -> list[RigidMotion]:
-    """Poses of observations (F, 2, p) px frame after frame, from each of several motions of one frame; all at a time."""
+def poses_over_time(W: Array, visible: Mask, starts: list[RigidMotion], camera: Camera) -> list[RigidMotion]:
+    """Poses of observations (F, 2, p) px, frame after frame, of each of several shapes, from its pose before the first."""
     h = visible.astype(np.float64)
     W = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None]
     energy = replace(pose_energy(camera), rotation=0.0, scale=0.0)  # starts are no neighbours in time
@@ -120,11 +85,6 @@ def pose_data(W: Array, h: Array, shape: Array, camera: Camera) -> Statistics:
     return pose_statistics(basis, W / radius, h, camera.focal_px / radius)
 
 
-def rms_radius(shape: Array) -> float:
-    """RMS distance of a centred shape's (3, p) points from its centre."""
-    return float(np.sqrt((shape**2).sum() / shape.shape[1]))
-
-
 def solve_points(W: Array, h: Array, motion: RigidMotion, camera: Camera, *, flat: bool) -> Array:
     """Shape (3, p), centred, given the poses: one small linear system a point, exact also under perspective."""
     A = motion.s[:, None, None] * motion.R
@@ -139,7 +99,7 @@ def solve_points(W: Array, h: Array, motion: RigidMotion, camera: Camera, *, fla
     anchor = damping @ motion.shape[:k]
     points = np.linalg.solve(gram + damping, (right + anchor.T)[:, :, None])[:, :, 0].T
     shape = np.concatenate([points, np.zeros((3 - k, points.shape[1]))])
-    return np.asarray(shape - shape.mean(axis=1, keepdims=True))
+    return shape - shape.mean(axis=1, keepdims=True)
 
 
 def reprojection_rms(W: Array, h: Array, motion: RigidMotion, camera: Camera) -> float:

@@ -3,13 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
-from reconstruction.mapping.rigid import RigidMotion, follow, reprojection_rms, solve_points
-
-Array = NDArray[np.float64]
-Visibility = NDArray[np.bool_]
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion, tilt_axes
+from reconstruction.mapping.rigid import poses_over_time, reprojection_rms, solve_points
 
 TILTS_DEGREES = (20.0, 40.0, 60.0)  # looked at first, ...
 DIRECTIONS = 8  # ... each so many ways; then ...
@@ -27,13 +25,7 @@ def sheet(image: Array, R: Array, camera: Camera) -> RigidMotion:
     return replace(motion, shape=shape)
 
 
-def tilt_axes(directions: int = 4) -> Array:
-    """(n, 3) unit rotation axes in the image plane, evenly spread."""
-    angle = 2 * np.pi * np.arange(directions) / directions
-    return np.stack([np.cos(angle), np.sin(angle), np.zeros(directions)], axis=1)
-
-
-def best_tilted(image: Array, W: Array, visible: Visibility, camera: Camera) -> tuple[RigidMotion, float]:
+def best_tilted(image: Array, W: Array, visible: Mask, camera: Camera) -> tuple[RigidMotion, float]:
     """The sheet that looks like the image (2, p) px and, of all tilts, fits observations (F, 2, p) px best.
 
     Poses and points in turn would creep from any start to the tilt: a sheet tilted a little less fits nearly as well.
@@ -46,7 +38,7 @@ def best_tilted(image: Array, W: Array, visible: Visibility, camera: Camera) -> 
 
     def tried(tilts: Array) -> tuple[RigidMotion, float, Array]:
         sheets = [sheet(image, R, camera) for R in rotation_from_quaternion(quaternion_exp(tilts))]
-        motions = follow(W[few], visible[few], sheets, camera)
+        motions = poses_over_time(W[few], visible[few], sheets, camera)
         errors = np.nan_to_num([reprojection_rms(known, h, motion, camera) for motion in motions], nan=np.inf)
         k = int(errors.argmin())
         return motions[k], float(errors[k]), tilts[k]
@@ -58,5 +50,5 @@ def best_tilted(image: Array, W: Array, visible: Visibility, camera: Camera) -> 
         if other[1] < error:
             motion, error, tilt = other
     sharpness = tried(tilt + APART_DEGREES * ring)[1] / max(error, 1e-12)
-    (motion,) = follow(W, visible, [replace(motion, R=motion.R[:1], s=motion.s[:1], t=motion.t[:1])], camera)
+    (motion,) = poses_over_time(W, visible, [replace(motion, R=motion.R[:1], s=motion.s[:1], t=motion.t[:1])], camera)
     return motion, sharpness

@@ -1,43 +1,87 @@
-"""Branches of one picture: a surface bent or tilted otherwise can look alike, and only its energy tells (paper §5)."""
+"""Branches that look alike in one picture, a surface bent or tilted otherwise: where else to start, and what changed.
 
-from dataclasses import dataclass
+Frontal poses are saddle points, and edge lengths make the energy of Λ non-convex, so that the solver finds the branch that
+its start is on; only the energy tells which is right.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 
-from reconstruction.window.solver import Solution
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis.model import Model
+from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.camera import (
+    quaternion_exp,
+    quaternion_from_rotation,
+    quaternion_product,
+    rotation_from_quaternion,
+    tilt_axes,
+)
+from reconstruction.estimate import SAME_BEND, SAME_TILT_DEGREES, Switch
+from reconstruction.state import State
+from reconstruction.window.energy import pose_energy
+from reconstruction.window.solver import Solution, Solver, minimise
+from reconstruction.window.statistics import image_statistics
 
-SAME_BEND = 0.9  # cosine between two bends from which they count as one
-SAME_TILT_DEGREES = 5.0  # turn between two poses up to which they count as one
-
-
-@dataclass(frozen=True)
-class Switch:
-    """A frame whose window took another branch than the frames before lead to.
-
-    Attributes:
-        bend: cosine between the bends Γ_τ of the two branches: 1 is the same, −1 the mirror image.
-        turned_degrees: rotation between their poses.
-        share: energy of the branch taken over that of the one left.
-    """
-
-    bend: float
-    turned_degrees: float
-    share: float
-
-    def at(self, frame: int) -> str:
-        """In words: `bent back at frame 61: energy 0.62 of the other branch`."""
-        bent = "" if self.bend >= SAME_BEND else "bent back" if self.bend < 0 else "bent otherwise"
-        tilted = f"tilted by {self.turned_degrees:.0f}°" if self.turned_degrees > SAME_TILT_DEGREES else ""
-        what = " and ".join(filter(None, (bent, tilted)))
-        return f"{what} at frame {frame}: energy {self.share:.2f} of the other branch"
+TILT_GAIN = 0.7  # another tilt must cost less than this share, be it energy or reprojection error
+FIRST_TILT = 0.3  # radians by which the first frame is tilted to look for a better pose
+FACING = 0.05  # radians within which a shape's main plane faces the camera
+LEAN = 0.1  # radians by which it is tilted then
+OTHER_BENDS = (np.zeros((3, 1)), np.array([[1.0], [1.0], [-1.0]]))  # factors on the rows of Λ: undeformed, bent back
 
 
-def switch_between(left: Solution, taken: Solution) -> Switch | None:
+def switch_between(left: Solution, found: Solution) -> Switch | None:
     """The switch from one branch to another, by their newest frames; None if those are the same but for details."""
-    bends = left.state.Lambda[-1, 2], taken.state.Lambda[-1, 2]
+    bends = left.state.Lambda[-1, 2], found.state.Lambda[-1, 2]
     size = np.linalg.norm(bends[0]) * np.linalg.norm(bends[1])
     bend = float(bends[0] @ bends[1] / size) if size > 0 else 1.0
-    turned = float(np.rad2deg(2 * np.arccos(min(1.0, abs(left.state.q[-1] @ taken.state.q[-1])))))
+    turned = float(np.rad2deg(2 * np.arccos(min(1.0, abs(left.state.q[-1] @ found.state.q[-1])))))
     if bend >= SAME_BEND and turned <= SAME_TILT_DEGREES:
         return None
-    return Switch(bend, turned, float(taken.value.sum() / left.value.sum()))
+    return Switch(bend, turned, float(found.value.sum() / left.value.sum()))
+
+
+def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask) -> tuple[State, Switch | None]:
+    """Pose of the first frame with nothing deformed, r = 0: that of the bootstrap, or a tilt of clearly less energy.
+
+    Args:
+        model: the rest shape and its modes.
+        motion: how the rest shape is seen in the first frame.
+        W: (2, p) px.
+        visible: (p,) which points to use.
+    """
+    shape = motion.shape
+    data = image_statistics(model, W, visible.astype(np.float64), rigid=True)
+    seen = W[:, visible] - model.camera.center_px[:, None]
+    extent = np.var((motion.R[0] @ shape)[:2, visible], axis=1).sum()
+    log_s = np.log(np.sqrt(np.var(seen, axis=1).sum() / extent))
+    q = quaternion_from_rotation(motion.R[0] @ model.basis.Phi)
+    start = State(q[None], seen.mean(axis=1)[None] / model.radius, np.array([log_s]), np.zeros((1, 3, 0)))
+    energy = pose_energy(model.camera)
+    found = best = minimise(energy, data, start, None, Solver())
+    for tilt in FIRST_TILT * tilt_axes():
+        tilted = replace(start, q=quaternion_product(quaternion_exp(tilt), q)[None])
+        other = minimise(energy, data, tilted, None, Solver())
+        if other.value[0] < TILT_GAIN * best.value[0]:
+            best = other
+    return best.state, switch_between(found, best)
+
+
+def off_the_saddle(last: State, model: Model) -> State:
+    """Where the frame after `last` (n = 1) starts: there, but tilted a little if it faces an orthographic camera.
+
+    Facing it, the image's derivatives with respect to tilt and bending are zero, and the solver would never leave. (At
+    constant velocity a tilt would overshoot into the mirrored branch.)
+    """
+    facing = abs(float(rotation_from_quaternion(last.q)[0, 2, 2]))
+    if model.camera.perspective or facing < np.cos(FACING):
+        return last
+    return replace(last, q=quaternion_product(quaternion_exp(np.array([[LEAN, 0.0, 0.0]])), last.q))
+
+
+def other_bend(state: State, factors: Array, rest: Array) -> State:
+    """The state with the newest frame's Λ' about the rest shape Λ̄' (3, r) multiplied by factors (3, 1)."""
+    Lambda = state.Lambda.copy()
+    Lambda[-1] = rest + factors * (Lambda[-1] - rest)
+    return replace(state, Lambda=Lambda)

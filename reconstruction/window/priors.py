@@ -59,11 +59,6 @@ PRIORS: dict[PriorName, Prior] = {
         "The object turns slowly (q is the unit quaternion). More where the pose jitters.",
         {"general": 1e-4, OTHERWISE: 3e-4},
     ),
-    "translation": Prior(
-        "λ_t ‖Δt‖²",
-        "The object stays where it is in the picture. The images tell t so well that it is hardly ever of use.",
-        {OTHERWISE: 0.0},
-    ),
     "scale": Prior(
         "λ_s (Δ log s)²",
         "The object stays as far away. Less for an orthographic camera that zooms, more for a perspective one before which "

@@ -1,17 +1,15 @@
-"""A rest shape that keeps improving: frames that have left the window go on to say where the surface rests (paper §4).
+"""Refinement of the rest shape by the frames that have left the window (paper §4).
 
-It moves within the span of its modes, S̄ + ΦΛ̄Υ, so that modes, model and S = S̄ + ΦΛΥ stay what they are and only the
-coefficients Λ̄ of the surface at rest are estimated. A frame's data term is quadratic in Λ, so frames with settled pose and
-deformation add up to one normal system for a shift that they all share; no point is touched again.
+It moves within the span of its modes, S̄ + ΦΛ̄Υ, so that modes, model and S = S̄ + ΦΛΥ stay the same and only the coefficients
+Λ̄ of the rest shape are estimated. A frame's data term is quadratic in Λ, so with pose and deformation fixed all frames add
+up to one linear system for a shift that they share; the points are not needed again.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reconstruction.arrays import Array
 from reconstruction.state import POSE
-from reconstruction.window.energy import Normal
-
-Array = NDArray[np.float64]
+from reconstruction.window.normal import Normal
 
 PULL = 0.4  # towards the first rest shape; a frame in which all points are seen weighs about 1
 KEPT = 0.98  # of what is known, frame by frame: some 50 frames count
@@ -19,7 +17,7 @@ FEWEST = 5  # frames; fewer turn too little to tell rest from pose
 
 
 class Refinement:
-    """Where the surface rests, by the frames so far; one public verb.
+    """The refined rest shape; one public verb.
 
     Args:
         modes: r.
@@ -33,9 +31,9 @@ class Refinement:
         self._hessian, self._right = np.zeros((3 * modes, 3 * modes)), np.zeros(3 * modes)
         self._frames = 0
 
-    def take(self, seen: Normal) -> None:
-        """Learn from the data term of one settled frame (n = 1), which was deformed about the rest as it is now."""
-        hessian, gradient = seen.diagonal[0, POSE:, POSE:], seen.gradient[0, POSE:]
+    def add(self, data: Normal) -> None:
+        """Add the data term of one frame (n = 1), linearised about its final state; `rest` is estimated anew."""
+        hessian, gradient = data.diagonal[0, POSE:, POSE:], data.gradient[0, POSE:]
         self._hessian = KEPT * self._hessian + hessian
         self._right = KEPT * self._right + hessian @ self.rest.ravel() - gradient
         self._frames += 1

@@ -5,16 +5,16 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.lib.stride_tricks import as_strided
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError
 from scipy.linalg.lapack import dpbsv
 
+from reconstruction.arrays import Array
 from reconstruction.state import State
-from reconstruction.window.energy import Energy, Normal, evaluate, linearise
-from reconstruction.window.marginal import Past
+from reconstruction.window.energy import Energy
+from reconstruction.window.marginal import Previous
+from reconstruction.window.normal import Normal
 from reconstruction.window.statistics import Statistics
-
-Array = NDArray[np.float64]
+from reconstruction.window.terms import evaluate, linearise
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Solution:
     steps: int
 
 
-def minimise(energy: Energy, data: Statistics, start: State, before: Past | None, solver: Solver) -> Solution:
+def minimise(energy: Energy, data: Statistics, start: State, before: Previous | None, solver: Solver) -> Solution:
     """Minimise the energy of a window from `start`; `before` is the frame that has left it."""
     state, damping, steps = energy.completed(start), solver.damping, 0
     before = before and replace(before, state=energy.completed(before.state))
@@ -59,9 +59,9 @@ def minimise(energy: Energy, data: Statistics, start: State, before: Past | None
                 break
             damping *= 10
             continue
-        settled = gain <= solver.tolerance * normal.value.sum()
+        converged = gain <= solver.tolerance * normal.value.sum()
         state, damping = trial, max(damping / 10, 1e-9)
-        if settled:
+        if converged:
             return Solution(state, value, steps)
         normal = linearise(energy, data, state, before, value)
     return Solution(state, normal.value, steps)
@@ -79,7 +79,7 @@ def damped_step(normal: Normal, damping: float) -> Array:
 
 
 def banded(diagonal: Array, coupling: Array) -> Array:
-    """The lower band of a symmetric block tridiagonal matrix: row j holds what stands in column j, downwards from (j, j).
+    """The lower band of a symmetric block tridiagonal matrix: row j holds column j from the diagonal downwards.
 
     Neighbours couple θ with θ and every other parameter with itself, so the band is hardly wider than one block; a
     Cholesky factor within it takes half the work of one by blocks, O(n d³).
@@ -119,4 +119,4 @@ def solve_banded(band: Array, right: Array) -> Array:
     _, x, failed = dpbsv(band.T, right.ravel(), lower=1, overwrite_ab=1)
     if failed:
         raise LinAlgError("not positive definite")
-    return np.asarray(x.reshape(right.shape))
+    return x.reshape(right.shape)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from reconstruction.arrays import Array
+from reconstruction.basis.model import Model
 
 BLOCK = 1024  # points summed up at a time: their weighted basis stays in the cache, a third less time at 100,000 points
 
@@ -56,7 +56,7 @@ class Statistics:
     @cached_property
     def linear(self) -> Array:
         """(n, 3, K) half the linear part in M, negative."""
-        return np.asarray(self.cross * np.array([1.0, 1.0, -1.0])[:, None])
+        return self.cross * np.array([1.0, 1.0, -1.0])[:, None]
 
 
 def frame_statistics(basis: Array, W: Array, weights: Array, focal: float) -> Statistics:
@@ -83,6 +83,12 @@ def frame_statistics(basis: Array, W: Array, weights: Array, focal: float) -> St
     return from_sums(sums.reshape(1, 4, K, K), focal)
 
 
+def image_statistics(model: Model, W: Array, weights: Array, *, rigid: bool = False) -> Statistics:
+    """Statistics of one frame's points (2, p) px with weights (p,); `rigid`: of the rest shape alone, r = 0."""
+    basis = np.concatenate([model.B[:3], model.B[-1:]]) if rigid else model.B
+    return frame_statistics(basis, model.normalised(W), weights, model.focal)
+
+
 def pose_statistics(basis: Array, W: Array, weights: Array, focal: float) -> Statistics:
     """Statistics of n frames at once, where the basis is small: one product.
 
@@ -97,12 +103,6 @@ def pose_statistics(basis: Array, W: Array, weights: Array, focal: float) -> Sta
     moments = np.concatenate([np.ones((n, 1, p)), W, (W**2).sum(axis=1, keepdims=True)], axis=1) * (weights / p)[:, None]
     sums = moments.reshape(4 * n, p) @ (basis[:, None] * basis).reshape(K * K, p).T
     return from_sums(sums.reshape(n, 4, K, K), focal)
-
-
-def down_date(complete: Array, basis: Array, lost: NDArray[np.bool_]) -> Array:
-    """B diag(h) Bᵀ (K, K) from the constant B Bᵀ `complete` by taking the few lost points away."""
-    gone = basis[:, lost]
-    return np.asarray(complete - gone @ gone.T)
 
 
 def from_sums(sums: Array, focal: float) -> Statistics:
@@ -123,12 +123,12 @@ def stack(parts: list[Statistics]) -> Statistics:
 
 def gradient(statistics: Statistics, M: Array) -> Array:
     """Half the derivative (n, 3, K) of the data terms with respect to M (n, 3, K)."""
-    return np.asarray(apply(statistics, M[:, None])[:, 0] - statistics.linear)
+    return apply(statistics, M[:, None])[:, 0] - statistics.linear
 
 
 def apply(statistics: Statistics, M: Array) -> Array:
     """The quadratic form's matrix times M: (n, k, 3, K) for directions M (n, k, 3, K)."""
-    return np.asarray((M.reshape(*M.shape[:2], -1) @ statistics.form).reshape(M.shape))
+    return (M.reshape(*M.shape[:2], -1) @ statistics.form).reshape(M.shape)
 
 
 def value(statistics: Statistics, M: Array) -> Array:
@@ -136,10 +136,10 @@ def value(statistics: Statistics, M: Array) -> Array:
     product = apply(statistics, M[:, None])[:, 0]
     product -= 2 * statistics.linear
     product *= M
-    return np.asarray(statistics.power + product.sum(axis=(1, 2)))
+    return statistics.power + product.sum(axis=(1, 2))
 
 
 def residuals(basis: Array, W: Array, M: Array, focal: float) -> Array:
     """ρ (2, p) of one frame, point by point: what `value` sums up."""
     seen = M @ basis
-    return np.asarray(W - seen[:2] + W / focal * seen[2])
+    return W - seen[:2] + W / focal * seen[2]

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from reconstruction import ReconstructionError
+from reconstruction.basis import rest_shape
 from reconstruction.camera import Camera
+from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import e3d, with_missing, with_outliers
-from reconstruction.mapping import rest_shape
-from reconstruction.online import Phase, Reconstruction, Settings
-from reconstruction.settings import Deformation
-from reconstruction.window.model import ShapeEstimate
-from reconstruction.window.window import robust_weights
+from reconstruction.mapping.evidence import weigh
+from reconstruction.online import Phase, Reconstruction
+from reconstruction.settings import Deformation, Settings
+from reconstruction.window.robust import robust_weights
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, flat, relief, rolled, seen, turn, turns
 
 FRAMES, POINTS = 26, 70
@@ -152,8 +153,8 @@ def test_a_source_that_ends_early_still_gets_its_shapes(kind: str) -> None:
 
 
 @pytest.mark.parametrize("frames", ["auto", 20])
-def test_a_still_scene_is_no_rigid_shape(frames: int | str) -> None:
-    settings = replace(SETTINGS, rest_shape="rigid", bootstrap_frames=None if frames == "auto" else int(frames))
+def test_a_still_scene_is_no_rigid_shape(frames: Literal["auto"] | int) -> None:
+    settings = replace(SETTINGS, rest_shape="rigid", bootstrap_frames=frames)
     words = r"cannot recover a rest shape: the object turned \d+\.\d° in \d+ frames, about 10° are needed"
     with pytest.raises(ReconstructionError, match=words):
         reconstruct(still_sheet(), settings=settings)
@@ -374,7 +375,7 @@ def test_a_sheet_before_something_that_moves_by_itself_is_no_solid() -> None:
     drift = np.stack([10 * np.sin(k / 20), 6 * np.cos(k / 27)], axis=1)[:, :, None]
     W_behind = behind[:2] + drift + PERSPECTIVE.center_px[:, None]
     W = np.concatenate([W_front, W_behind], axis=2) + rng.normal(0, 0.1, (60, 2, 120))
-    assert not rest_shape.weigh(W[:20], np.ones((20, 120), bool)).doubt
+    assert not weigh(W[:20], np.ones((20, 120), bool)).doubt
     reconstruction, _ = reconstruct(W, settings=Settings())
     assert reconstruction.rest is not None
     assert reconstruction.rest.kind == "plane"

@@ -5,12 +5,12 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from reconstruction.basis.mesh import triangulate
+from reconstruction.basis.model import Model
 from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import Camera, nearest_rotation, quaternion_exp, rotation_from_quaternion
 from reconstruction.settings import Metric
 from reconstruction.state import State
-from reconstruction.window.model import Model
-from reconstruction.window.statistics import Statistics, stack
+from reconstruction.window.statistics import Statistics, image_statistics, stack
 
 Array = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ def rolled(sheet: Array, curvature: float) -> Array:
     if abs(curvature) < 1e-12:
         return sheet
     bent = np.stack([np.sin(curvature * x) / curvature, y, (np.cos(curvature * x) - 1) / curvature])
-    return np.asarray(bent - bent.mean(axis=1, keepdims=True))
+    return bent - bent.mean(axis=1, keepdims=True)
 
 
 def turn(degrees: tuple[float, float, float]) -> Array:
@@ -80,7 +80,7 @@ def random_rotation(rng: np.random.Generator) -> Array:
 
 def unit_quaternions(rng: np.random.Generator, n: int) -> Array:
     q = rng.normal(size=(n, 4))
-    return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
 
 
 def random_state(rng: np.random.Generator, n: int, r: int) -> State:
@@ -98,7 +98,7 @@ def model_of(shape: Array, camera: Camera, modes: int, metric: Metric = "euclide
 
 def statistics_of(model: Model, W: Array, weights: Array) -> Statistics:
     """Sums of several frames (n, 2, p) px."""
-    return stack([model.statistics(w, h) for w, h in zip(W, weights, strict=True)])
+    return stack([image_statistics(model, w, h) for w, h in zip(W, weights, strict=True)])
 
 
 def shape_error(estimate: Array, truth: Array) -> float:

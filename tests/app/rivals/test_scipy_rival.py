@@ -9,10 +9,10 @@ from app.rivals.problems import WindowStep, full_model, summed, window_step
 from app.rivals.residuals import parameters
 from app.rivals.scipy_rival import ScipyWindow, exponential, exponential_slope
 from reconstruction.camera import quaternion_exp
-from reconstruction.window.energy import evaluate
-from reconstruction.window.marginal import Past
+from reconstruction.window.marginal import Previous
 from reconstruction.window.solver import Solver
 from reconstruction.window.statistics import stack
+from reconstruction.window.terms import evaluate
 
 
 @pytest.mark.parametrize("deformation", window.DEFORMATIONS)
@@ -21,7 +21,7 @@ def test_scipy_minimises_the_energy_of_the_solver(deformation: str) -> None:
     data = stack([step.settled, summed(step.B, step.W[-1], step.focal)])
     scipy = ScipyWindow(step)
     x = np.concatenate([np.zeros((problems.WINDOW, 3)), parameters(step.start, step.energy.rows)[:, 4:]], axis=1).ravel()
-    ours = evaluate(step.energy, data, step.start, Past(step.before)).sum()
+    ours = evaluate(step.energy, data, step.start, Previous(step.before)).sum()
     assert (scipy.residuals(x) ** 2).sum() == pytest.approx(ours, rel=1e-9)
     end = window.solved(step, Solver(iterations=100, tolerance=1e-12)).value.sum()
     assert scipy.solve(1e-12) == pytest.approx(end, rel=1e-6)

@@ -11,7 +11,6 @@ from reconstruction import ReconstructionError
 from reconstruction.basis import distances
 from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modes import (
-    Metric,
     ModalBasis,
     doubly_centred,
     leading_eigenpairs,
@@ -19,6 +18,7 @@ from reconstruction.basis.modes import (
     principal_axes,
     with_fixed_signs,
 )
+from reconstruction.settings import Metric
 from tests.reconstruction.world import SEEDS, flat, relief
 
 METRICS: tuple[Metric, ...] = get_args(Metric)

@@ -7,7 +7,8 @@ import pytest
 
 from reconstruction.camera import Camera
 from reconstruction.mapping.focal import FEWEST, search
-from reconstruction.online import Reconstruction, Settings
+from reconstruction.online import Reconstruction
+from reconstruction.settings import Settings
 from tests.reconstruction.world import PERSPECTIVE, flat, rolled, seen, turn
 
 FRAMES = 48

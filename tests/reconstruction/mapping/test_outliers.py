@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 
 from reconstruction.evaluation import with_missing, with_outliers
-from reconstruction.mapping.outliers import medians, off_the_common_motion, without_outliers
+from reconstruction.mapping.outliers import medians, without_outliers
+from reconstruction.window.robust import off_the_common_motion
 from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, Camera, flat, relief, rolled, seen, turns
 
 FRAMES, POINTS = 12, 60

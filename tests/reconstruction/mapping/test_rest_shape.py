@@ -6,10 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reconstruction import ReconstructionError
+from reconstruction.basis.rest_shape import given as given_shape
 from reconstruction.camera import Camera
 from reconstruction.mapping import rest_shape
+from reconstruction.mapping.evidence import apparent_change, foreshortening_degrees, judging_points, weigh
 from reconstruction.mapping.factorization import view_turn_degrees
-from reconstruction.mapping.rest_shape import apparent_change, first_image, foreshortening_degrees, judging_points, weigh
+from reconstruction.mapping.rest_shape import first_image
 from reconstruction.mapping.sheet import sheet
 from tests.reconstruction.world import (
     CAMERAS,
@@ -184,7 +186,7 @@ def test_a_sheet_in_a_given_plane_looks_like_the_image(rng: np.random.Generator,
 @given(SEEDS, st.sampled_from([flat, relief]))
 def test_given_shapes_are_centred_and_known_to_be_flat_or_not(rng: np.random.Generator, surface) -> None:  # type: ignore[no-untyped-def]
     shape = turn((20, 30, 10)) @ surface(rng, POINTS)
-    found = rest_shape.given(shape + 100.0, "mesh", "a note")
+    found = given_shape(shape + 100.0, "mesh", "a note")
     np.testing.assert_allclose(found.motion.shape, shape, atol=1e-9)
     assert found.flat == (surface is flat)
     assert (found.kind, found.note) == ("mesh", "a note")

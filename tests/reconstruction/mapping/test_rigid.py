@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.factorization import factorize
-from reconstruction.mapping.rigid import RigidMotion, bundle_adjust, reprojection_rms, solve_points
+from reconstruction.mapping.rigid import bundle_adjust, reprojection_rms, solve_points
 from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, random_rotation, relief, seen, shape_error, turns
 
 FRAMES, POINTS = 14, 40

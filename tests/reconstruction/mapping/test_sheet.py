@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from reconstruction.mapping.sheet import best_tilted, sheet, tilt_axes
+from reconstruction.camera import tilt_axes
+from reconstruction.mapping.sheet import best_tilted, sheet
 from tests.reconstruction.world import PERSPECTIVE, flat, seen, turn, turns
 
 FRAMES, POINTS = 16, 60

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reconstruction.mapping import rest_shape
-from reconstruction.online import Reconstruction, Settings
-from reconstruction.window.ambiguity import Switch, switch_between
+from reconstruction.basis import rest_shape
+from reconstruction.estimate import Switch
+from reconstruction.online import Reconstruction
+from reconstruction.settings import Settings
+from reconstruction.window.ambiguity import switch_between
 from reconstruction.window.solver import Solution
 from tests.reconstruction.world import PERSPECTIVE, flat, random_state, rolled, seen, shape_error, turn
 

@@ -8,20 +8,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from reconstruction.basis.constraints import Bending
+from reconstruction.basis.model import Model
 from reconstruction.state import POSE, State, join
 from reconstruction.window import statistics
-from reconstruction.window.edges import Bending
-from reconstruction.window.energy import (
-    HAT,
-    Energy,
-    evaluate,
-    linearise,
-    quaternion_difference,
-    smoothness,
-)
-from reconstruction.window.marginal import Past
-from reconstruction.window.model import Model
+from reconstruction.window.energy import Energy
+from reconstruction.window.marginal import Previous
+from reconstruction.window.smoothness import quaternion_difference, smoothness
 from reconstruction.window.statistics import Statistics
+from reconstruction.window.terms import HAT, evaluate, linearise
 from tests.reconstruction.world import (
     CAMERAS,
     ORTHOGRAPHIC,
@@ -34,7 +29,7 @@ from tests.reconstruction.world import (
 )
 
 FRAMES, MODES, POINTS = 3, 3, 25
-SILENT = Energy(rotation=0.0, translation=0.0, scale=0.0, smoothness=0.0, rest=0.0)
+SILENT = Energy(rotation=0.0, scale=0.0, smoothness=0.0, rest=0.0)
 ROWS = st.sampled_from([(0, 1, 2), (2,), (0, 1), ()])
 
 
@@ -47,7 +42,7 @@ class Scene:
     weights: np.ndarray
     data: Statistics
     state: State
-    before: Past
+    before: Previous
 
 
 def scene_of(rng: np.random.Generator, camera=ORTHOGRAPHIC) -> Scene:  # type: ignore[no-untyped-def]
@@ -55,13 +50,13 @@ def scene_of(rng: np.random.Generator, camera=ORTHOGRAPHIC) -> Scene:  # type: i
     W = 80 * rng.normal(size=(FRAMES, 2, POINTS)) + camera.center_px[:, None]
     weights = np.where(rng.random((FRAMES, POINTS)) < 0.7, rng.random((FRAMES, POINTS)), 0.0)
     chain = random_state(rng, FRAMES + 1, MODES)
-    return Scene(model, W, weights, statistics_of(model, W, weights), chain[1:], Past(chain[:1]))
+    return Scene(model, W, weights, statistics_of(model, W, weights), chain[1:], Previous(chain[:1]))
 
 
 def held(scene: Scene, rng: np.random.Generator, rows: tuple[int, ...]) -> Scene:
     """The same with what is known of the rows of Λ from the frames before."""
     root = rng.normal(size=2 * [len(rows) * MODES])
-    return replace(scene, before=replace(scene.before, hold=root @ root.T))
+    return replace(scene, before=replace(scene.before, information=root @ root.T))
 
 
 def nothing_seen(scene: Scene) -> Statistics:
@@ -74,7 +69,6 @@ def terms(scene: Scene) -> dict[str, Energy]:
     edges = scene.model.coarse_edges(12)
     return {
         "rotation": replace(SILENT, rotation=0.7),
-        "translation": replace(SILENT, translation=0.4),
         "scale": replace(SILENT, scale=0.6),
         "smoothness": replace(SILENT, smoothness=np.array([0.2, 0.3, 0.6])),
         "jumps": replace(SILENT, smoothness=np.array([0.2, 0.3, 0.6]), jump=0.05),
@@ -87,7 +81,6 @@ def everything(scene: Scene, rows: tuple[int, ...], *, tied: bool) -> Energy:
     """Every term, with a pull to rest of its own for each mode."""
     return Energy(
         rotation=0.7,
-        translation=0.4,
         scale=0.6,
         smoothness=0.3,
         rest=np.array([0.5, 0.9, 1.3]),
@@ -126,10 +119,10 @@ def check_gradient(energy: Energy, data: Statistics, scene: Scene, rng: np.rando
 
 def replace_states(scene: Scene, state: State) -> Scene:
     before = replace(scene.before.state, Lambda=np.zeros((1, 3, state.Lambda.shape[2])))
-    return replace(scene, state=state, before=Past(before))
+    return replace(scene, state=state, before=Previous(before))
 
 
-@pytest.mark.parametrize("term", ["rotation", "translation", "scale", "smoothness", "jumps", "rest", "inextensibility"])
+@pytest.mark.parametrize("term", ["rotation", "scale", "smoothness", "jumps", "rest", "inextensibility"])
 @settings(max_examples=10)
 @given(rng=SEEDS, tied=st.booleans(), known=st.booleans())
 def test_gradient_of_each_prior(term: str, rng: np.random.Generator, tied: bool, known: bool) -> None:
@@ -155,7 +148,7 @@ def test_gradient_of_everything(rng, camera, rows, tied, free_scale) -> None:  #
     scene = scene_of(rng, camera)
     energy = replace(everything(scene, rows, tied=tied), free_scale=free_scale)
     if not rows:
-        energy = replace(energy.rigid(), rest=0.0)
+        energy = replace(energy, edges=None, inextensibility=0.0, rest=0.0)
     check_gradient(energy, scene.data, scene, rng)
 
 
@@ -195,10 +188,9 @@ def residuals(energy: Energy, scene: Scene, state: State) -> np.ndarray:
     for a, b in zip(range(len(chain) - 1), range(1, len(chain)), strict=True):
         sign = 1.0 if chain.q[a] @ chain.q[b] > 0 else -1.0
         parts.append(np.sqrt(energy.rotation) * (chain.q[b] - sign * chain.q[a]))
-        parts.append(np.sqrt(energy.translation) * (chain.t[b] - chain.t[a]))
         parts.append(np.sqrt(energy.scale) * (chain.log_s[b] - chain.log_s[a]))
         change = (chain.Lambda[b] - chain.Lambda[a])[energy.rows, :]
-        hold = scene.before.hold if energy.tied and a == 0 else None
+        hold = scene.before.information if energy.tied and a == 0 else None
         parts.append(np.sqrt(energy.smoothness) * change if hold is None else np.linalg.cholesky(hold).T @ change.ravel())
     return np.concatenate([np.ravel(part) for part in parts])
 
@@ -254,7 +246,7 @@ def test_fixed_scale_is_left_alone() -> None:
 def test_an_untied_window_floats() -> None:
     scene = scene_of(np.random.default_rng(6))
     tied = everything(scene, (0, 1, 2), tied=True)
-    elsewhere = Past(replace(scene.before.state, t=scene.before.state.t + 9.0))
+    elsewhere = Previous(replace(scene.before.state, log_s=scene.before.state.log_s + 9.0))
     values = [evaluate(tied, scene.data, scene.state, b)[0] for b in (scene.before, elsewhere)]
     assert values[1] > values[0] + 1
     floating = replace(tied, tied=False)

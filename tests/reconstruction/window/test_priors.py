@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from reconstruction import ReconstructionError
+from reconstruction.basis import rest_shape
 from reconstruction.camera import Camera
-from reconstruction.mapping import rest_shape
-from reconstruction.online import Reconstruction, Settings
-from reconstruction.settings import Deformation
-from reconstruction.window.constraints import build_energy
-from reconstruction.window.model import ShapeEstimate
+from reconstruction.estimate import ShapeEstimate
+from reconstruction.online import Reconstruction
+from reconstruction.settings import Deformation, Settings
+from reconstruction.window.energy import build_energy
 from reconstruction.window.priors import PRIORS, Weights, table, weights
 from reconstruction.window.window import SlidingWindow
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, model_of, relief, seen, turns
@@ -56,7 +56,6 @@ def test_weights_unless_given(
         "rest": rest,
         "smoothness": smoothness,
         "rotation": rotation,
-        "translation": 0.0,
         "scale": scale,
         "inextensibility": inextensibility,
     }
@@ -110,12 +109,11 @@ def test_each_prior_holds_what_it_is_named_after() -> None:
             "rest": [one.Lambda for one in found],
             "smoothness": list(np.diff([one.Lambda for one in found], axis=0)),
             "rotation": list(np.diff([one.R for one in found], axis=0)),
-            "translation": list(np.diff([one.t for one in found], axis=0)),
             "scale": list(np.diff([one.s for one in found])),
         }
         return float(np.linalg.norm(states[name]))
 
-    for name in ("rest", "rotation", "translation", "scale"):
+    for name in ("rest", "rotation", "scale"):
         assert spread(name, 100.0) < 0.5 * spread(name, 0.0), name
     assert spread("smoothness", 100.0) < 0.7 * spread("smoothness", 0.0)  # new frames go on to improve one lasting shape
 

@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reconstruction.basis import rest_shape
 from reconstruction.camera import Camera
+from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import e3d
-from reconstruction.mapping import rest_shape
-from reconstruction.online import Reconstruction, Settings
+from reconstruction.online import Reconstruction
+from reconstruction.settings import Settings
 from reconstruction.state import State
-from reconstruction.window.energy import data_normal
-from reconstruction.window.model import ShapeEstimate
 from reconstruction.window.refinement import FEWEST, Refinement
 from reconstruction.window.statistics import Statistics
+from reconstruction.window.terms import data_normal
 from tests.reconstruction.world import (
     ORTHOGRAPHIC,
     PERSPECTIVE,
@@ -101,7 +102,7 @@ def test_a_rest_elsewhere_is_found_but_not_from_few_frames(camera: Camera) -> No
     data, states, rest = observed(camera, 60)
     refinement, gaps = Refinement(4), []
     for one, state in zip(data, states, strict=True):
-        refinement.take(data_normal(one, replace(state, Lambda=refinement.rest[None].copy())))
+        refinement.add(data_normal(one, replace(state, Lambda=refinement.rest[None].copy())))
         gaps.append(np.linalg.norm(refinement.rest - rest) / np.linalg.norm(rest))
     assert gaps[FEWEST - 2] == pytest.approx(1.0)
     assert gaps[FEWEST - 1] < 0.8
@@ -112,10 +113,10 @@ def test_frames_without_points_say_nothing_and_what_is_known_fades() -> None:
     data, states, rest = observed(ORTHOGRAPHIC, 30)
     refinement = Refinement(4)
     for one, state in zip(data, states, strict=True):
-        refinement.take(data_normal(one, replace(state, Lambda=refinement.rest[None].copy())))
+        refinement.add(data_normal(one, replace(state, Lambda=refinement.rest[None].copy())))
     found = np.linalg.norm(refinement.rest)
     nothing = Statistics(0 * data[0].gram, 0 * data[0].cross, 0 * data[0].power)
     for _ in range(1000):
-        refinement.take(data_normal(nothing, replace(states[0], Lambda=refinement.rest[None].copy())))
+        refinement.add(data_normal(nothing, replace(states[0], Lambda=refinement.rest[None].copy())))
     assert found > 0.7 * np.linalg.norm(rest)
     assert np.linalg.norm(refinement.rest) < 1e-3 * found

@@ -10,8 +10,9 @@ from scipy.linalg import LinAlgError
 
 from reconstruction.camera import Camera, quaternion_exp, quaternion_from_rotation, quaternion_product
 from reconstruction.state import State
-from reconstruction.window.energy import Energy, evaluate
+from reconstruction.window.energy import Energy
 from reconstruction.window.solver import Solver, banded, minimise, solve_banded
+from reconstruction.window.terms import evaluate
 from tests.reconstruction.world import CAMERAS, SEEDS, model_of, relief, seen, shape_error, statistics_of, turns
 
 
@@ -64,7 +65,7 @@ def scene(rng: np.random.Generator, camera: Camera, frames: int = 5, modes: int 
     return model, statistics_of(model, W, np.ones((frames, 50))), true, shape
 
 
-STIFF = Energy(rotation=1e-9, translation=0.0, scale=1e-9, smoothness=1.0, rest=1e-9, tied=False)
+STIFF = Energy(rotation=1e-9, scale=1e-9, smoothness=1.0, rest=1e-9, tied=False)
 
 
 def disturbed(rng: np.random.Generator, state: State, radians: float = 0.1) -> State:

@@ -94,15 +94,6 @@ def test_no_point_seen_is_no_data() -> None:
     assert statistics.value(data, M).tolist() == [0.0]
 
 
-@given(SEEDS, st.integers(0, 30))
-def test_down_date_is_recomputation(rng: np.random.Generator, count: int) -> None:
-    basis, _, _ = scene(rng)
-    lost = np.zeros(basis.shape[1], bool)
-    lost[rng.permutation(len(lost))[:count]] = True
-    kept = basis[:, ~lost]
-    np.testing.assert_allclose(statistics.down_date(basis @ basis.T, basis, lost), kept @ kept.T, atol=1e-10)
-
-
 @given(SEEDS, FOCAL)
 def test_stacked_frames_keep_their_values(rng: np.random.Generator, focal: float) -> None:
     basis, _, _ = scene(rng)

@@ -1,18 +1,28 @@
-"""Edges of a coarse mesh, and what keeps their lengths: paper and cloth bend without stretching (paper §3.4)."""
+"""Constraints on the deformation (paper §3.4): rows of Λ that stay zero, and surfaces that keep their lengths."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from reconstruction.arrays import Array
+from reconstruction.settings import Deformation
 
+AXES = ("alpha", "beta", "tau")  # of the rows of Λ: α and β in the main plane, τ across it
+ALL_ROWS = (0, 1, 2)
+ROWS: dict[str, tuple[int, ...]] = {"bending": (2,), "stretching": (0, 1), "general": ALL_ROWS, "inextensible": ALL_ROWS}
 GIVE = 1e-2  # pull of rows α and β to rest, against the mean squared strain: what edges leave open stays small
+
+
+def fitting(deformation: Deformation, *, flat: bool) -> Deformation:
+    """The constraint that `auto` stands for: a sheet keeps its lengths, a solid may deform in any way."""
+    if deformation != "auto":
+        return deformation
+    return "inextensible" if flat else "general"
 
 
 @dataclass(frozen=True)
 class CoarseEdges:
-    """Edges of a coarse mesh whose lengths the surface keeps (coarse, since smooth modes cannot stretch between).
+    """Edges of a coarse mesh whose lengths the surface keeps; smooth modes cannot stretch between its vertices.
 
     Attributes:
         rest: (3, e) end minus start in the rest shape S̄'.
@@ -30,19 +40,19 @@ class CoarseEdges:
 
     def vectors(self, Lambda: Array) -> Array:
         """Edges (..., 3, e) of the shapes deformed by Λ' (..., 3, r)."""
-        return np.asarray(self.rest + Lambda @ self.modes)
+        return self.rest + Lambda @ self.modes
 
     def strain(self, vectors: Array) -> Array:
         """ρ_e = (‖d_e‖² − l_e²)/(2 l_e) (n, e): the change of length to first order, without a square root."""
-        return np.asarray(((vectors**2).sum(axis=1) - self.length**2) / (2 * self.length))
+        return ((vectors**2).sum(axis=1) - self.length**2) / (2 * self.length)
 
 
 class Bending:
-    """Rows α and β of Λ' as they follow from row τ in a sheet that only bends.
+    """Rows α and β of Λ' as functions of row τ, for a sheet that bends without stretching.
 
-    Γ_τ alone makes an edge d̄ that it changes by δ longer, by (d̄_τ δ_τ + δ_τ²/2) over its length. A sheet of paper draws
-    in instead, by the in-plane Γ_α, Γ_β that take this back: d̄_α δ_α + d̄_β δ_β is linear in them, so they are a fixed
-    matrix times what Γ_τ adds, in the sense of least squares over all edges. Nothing but Γ_τ is estimated.
+    Γ_τ changes an edge d̄ by δ_τ and makes it longer by (d̄_τ δ_τ + δ_τ²/2) over its length. A sheet of paper draws in
+    instead: Γ_α and Γ_β change the length by d̄_α δ_α + d̄_β δ_β over it, which is linear in them. So the rows that cancel
+    the excess best, by least squares over all edges, are a fixed matrix times the excess. Only Γ_τ is estimated.
 
     Args:
         edges: of the coarse mesh.
@@ -64,7 +74,7 @@ class Bending:
         return Bending(self._edges, self._stiffness, centre)
 
     def completed(self, Lambda: Array) -> Array:
-        """Λ' (n, 3, r) with rows α and β as row τ wants them."""
+        """Λ' (n, 3, r) with rows α and β computed from row τ."""
         rise = (Lambda[:, 2] - self._centre[2]) @ self._edges.modes
         excess = rise * (self._rest[2] + 0.5 * rise)
         completed = Lambda.copy()
@@ -72,7 +82,7 @@ class Bending:
         return completed
 
     def slope(self, Lambda: Array) -> Array:
-        """Derivative (n, 3r, r) of Λ', row by row, by its row τ."""
+        """Derivative (n, 3r, r) of the completed Λ', row by row, with respect to row τ."""
         rise = (Lambda[:, 2] - self._centre[2]) @ self._edges.modes
         followed = -(self._drawn * (self._rest[2] + rise)[:, None]) @ self._edges.modes.T
         own = np.broadcast_to(np.eye(Lambda.shape[2]), (len(Lambda), *2 * (Lambda.shape[2],)))

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reconstruction.window.edges import Bending, CoarseEdges
-from reconstruction.window.model import Model
+from reconstruction.basis.constraints import Bending, CoarseEdges
+from reconstruction.basis.model import Model
 from tests.reconstruction.world import ORTHOGRAPHIC, SEEDS, flat, model_of, relief, rolled
 
 POINTS, MODES = 120, 12

@@ -1,54 +1,18 @@
-"""A rest shape with its modes made dimensionless: the bridge between pixels and the solver (paper §3.3)."""
-
-from dataclasses import dataclass
+"""A rest shape with its modes made dimensionless, seen by a camera: from pixels to the solver and back (paper §3.3)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis.constraints import CoarseEdges
 from reconstruction.basis.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges
 from reconstruction.basis.modes import ModalBasis, modal_basis, principal_axes
+from reconstruction.basis.rest_shape import RestShape, rms_radius
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
-from reconstruction.mapping.rest_shape import RestShape
+from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
 from reconstruction.state import State
-from reconstruction.window.ambiguity import Switch
-from reconstruction.window.edges import CoarseEdges
-from reconstruction.window.statistics import Statistics, frame_statistics
-
-Array = NDArray[np.float64]
 
 COARSE_VERTICES = 60
-
-
-@dataclass(frozen=True)
-class ShapeEstimate:
-    """One frame's pose and shape: S = R(S̄ + ΦΛΥ) moved in front of the camera (Eq. 3, 8).
-
-    Attributes:
-        frame: index in the order of observation.
-        quaternion: (4,) of R, w first.
-        R: (3, 3) rotation.
-        t: (2,) image translation, px: where the shape's origin is seen, relative to the principal point.
-        s: scale; the origin's depth is focal/s.
-        Lambda: (3, r) coefficients Γ_α, Γ_β, Γ_τ, px.
-        shape: (3, p) deformed shape in camera axes (x right, y down, z forward), pixels of the first frame.
-        projection_px: (p, 2) the shape seen by the camera.
-        residual_px: (p,) distance to the observation, NaN where not visible.
-        visible: (p,) h^f.
-        switch: the other branch that the window took with this frame, if it did.
-    """
-
-    frame: int
-    quaternion: Array
-    R: Array
-    t: Array
-    s: float
-    Lambda: Array
-    shape: Array
-    projection_px: Array
-    residual_px: Array
-    visible: NDArray[np.bool_]
-    switch: Switch | None = None
 
 
 class Model:
@@ -66,7 +30,7 @@ class Model:
     def __init__(self, basis: ModalBasis, mesh: Mesh, camera: Camera) -> None:
         self.basis, self.mesh, self.camera = basis, mesh, camera
         p = basis.rest.shape[1]
-        self.radius = float(np.sqrt((basis.rest**2).sum() / p))
+        self.radius = rms_radius(basis.rest)
         self.focal = camera.focal_px / self.radius
         self.B = np.concatenate([basis.Phi.T @ basis.rest / self.radius, np.sqrt(p) * basis.Upsilon, np.ones((1, p))])
 
@@ -79,26 +43,17 @@ class Model:
         """Image points (2, p) px as the solver wants them."""
         return (W - self.camera.center_px[:, None]) / self.radius
 
-    def statistics(self, W: Array, weights: Array) -> Statistics:
-        """Sums of one frame's points (2, p) px with weights (p,)."""
-        return frame_statistics(self.B, self.normalised(W), weights, self.focal)
-
-    def rigid_statistics(self, W: Array, weights: Array) -> Statistics:
-        """The same for the rest shape alone, r = 0."""
-        rigid = np.concatenate([self.B[:3], self.B[-1:]])
-        return frame_statistics(rigid, self.normalised(W), weights, self.focal)
-
     def projection(self, state: State, frame: int = -1) -> Array:
         """Image (2, p) px of one frame of a state."""
         seen = state.matrices()[frame] @ self.B
         depth = 1 + seen[2] / self.focal
-        return np.asarray(seen[:2] / depth * self.radius + self.camera.center_px[:, None])
+        return seen[:2] / depth * self.radius + self.camera.center_px[:, None]
 
     def residuals(self, W: Array, state: State, frame: int = -1) -> Array:
         """Reprojection errors (2, p) px of one frame of a state."""
         return W - self.projection(state, frame)
 
-    def estimate(self, frame: int, W: Array, visible: NDArray[np.bool_], state: State, row: int = -1) -> ShapeEstimate:
+    def estimate(self, frame: int, W: Array, visible: Mask, state: State, row: int = -1) -> ShapeEstimate:
         """One frame of a state in pixels; the observation W (2, p) gives the residuals."""
         R = rotation_from_quaternion(state.q[row]) @ self.basis.Phi.T
         s = float(np.exp(state.log_s[row]))

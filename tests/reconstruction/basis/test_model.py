@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 
+from reconstruction.basis.model import Model
 from reconstruction.camera import Camera, rotation_from_quaternion
 from reconstruction.state import State
 from reconstruction.window import statistics
-from reconstruction.window.model import Model
+from reconstruction.window.statistics import image_statistics
 from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, flat, model_of, random_state, relief
 
 POINTS, MODES = 40, 5
@@ -58,7 +59,9 @@ def test_everything_inside_is_dimensionless(rng: np.random.Generator, camera: Ca
     np.testing.assert_allclose((one.B[3:-1] ** 2).sum(axis=1) / POINTS, 1.0)
     np.testing.assert_allclose(two.B, one.B, atol=1e-7)
     W, weights, state = 100 * rng.normal(size=(2, POINTS)), rng.random(POINTS), near_state(rng)[:1]
-    values = [statistics.value(model.statistics(k * W, weights), state.matrices())[0] for model, k in ((one, 1), (two, 2))]
+    values = [
+        statistics.value(image_statistics(model, k * W, weights), state.matrices())[0] for model, k in ((one, 1), (two, 2))
+    ]
     assert values[1] == pytest.approx(values[0], rel=1e-6)
 
 
@@ -68,7 +71,7 @@ def test_data_term_is_the_mean_squared_reprojection_error_weighted_by_depth(
 ) -> None:
     model, state = model_of(relief(rng, POINTS), camera, MODES), near_state(rng)[:1]
     W = model.projection(state) + rng.normal(size=(2, POINTS))
-    value = statistics.value(model.statistics(W, np.ones(POINTS)), state.matrices())[0]
+    value = statistics.value(image_statistics(model, W, np.ones(POINTS)), state.matrices())[0]
     depth = 1 + (state.matrices()[0] @ model.B)[2] / model.focal
     direct = ((model.residuals(W, state) * depth / model.radius) ** 2).sum() / POINTS
     assert value == pytest.approx(direct, rel=1e-6)
@@ -81,8 +84,8 @@ def test_rigid_statistics_are_those_without_modes(rng: np.random.Generator, came
     rigid = State(state.q, state.t, state.log_s, np.zeros((1, 3, 0)))
     W, weights = 100 * rng.normal(size=(2, POINTS)), rng.random(POINTS)
     np.testing.assert_allclose(
-        statistics.value(model.rigid_statistics(W, weights), rigid.matrices()),
-        statistics.value(model.statistics(W, weights), still.matrices()),
+        statistics.value(image_statistics(model, W, weights, rigid=True), rigid.matrices()),
+        statistics.value(image_statistics(model, W, weights), still.matrices()),
         rtol=1e-9,
     )
 

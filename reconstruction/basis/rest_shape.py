@@ -1,0 +1,75 @@
+"""The rest shape S̄ (paper §3.1), and a rigid shape with the poses it is seen in."""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from reconstruction.arrays import Array
+
+Kind = Literal["rigid", "plane", "mesh", "truth"]
+
+FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
+
+
+@dataclass(frozen=True)
+class RigidMotion:
+    """A rigid shape and how it is seen in F frames.
+
+    Attributes:
+        shape: (3, p) centred.
+        R: (F, 3, 3) rotations.
+        s: (F,) scales.
+        t: (F, 2) image of the shape's origin relative to the principal point, px.
+    """
+
+    shape: Array
+    R: Array
+    s: Array
+    t: Array
+
+    def in_first_frame(self) -> "RigidMotion":
+        """The same in camera axes and pixels of the first frame: R[0] = 1, s[0] = 1."""
+        return replace(self, shape=self.s[0] * self.R[0] @ self.shape, R=self.R @ self.R[0].T, s=self.s / self.s[0])
+
+    def mirrored(self) -> "RigidMotion":
+        """Depth reversed: explains orthographic views as well."""
+        flip = np.diag([1.0, 1.0, -1.0])
+        return replace(self, shape=flip @ self.shape, R=flip @ self.R @ flip)
+
+
+@dataclass(frozen=True)
+class RestShape:
+    """S̄ with the poses of the frames it comes from.
+
+    Attributes:
+        kind: where it comes from.
+        motion: shape (3, p), and poses of the bootstrap frames; one frame or more.
+        note: the evidence in words, for the log.
+    """
+
+    kind: Kind
+    motion: RigidMotion
+    note: str
+
+    @property
+    def flat(self) -> bool:
+        """Whether the shape is a sheet: hardly any relief for its size."""
+        return is_flat(self.motion.shape)
+
+
+def given(shape: Array, kind: Kind, note: str) -> RestShape:
+    """A rest shape (3, p) from elsewhere: a mesh file, or the first true shape."""
+    shape = shape - shape.mean(axis=1, keepdims=True)
+    return RestShape(kind, RigidMotion(shape, np.eye(3)[None], np.ones(1), np.zeros((1, 2))), note)
+
+
+def is_flat(shape: Array) -> bool:
+    """Whether a shape (3, p) is a sheet: hardly any relief for its size."""
+    extent = np.linalg.svd(shape - shape.mean(axis=1, keepdims=True), compute_uv=False)
+    return bool(extent[2] < FLAT_RELIEF * extent[0])
+
+
+def rms_radius(shape: Array) -> float:
+    """RMS distance of the points (3, p) to their centroid."""
+    return float(np.sqrt(shape.var(axis=1).sum()))

@@ -1,0 +1,95 @@
+"""The terms of the energy that couple neighbouring frames (paper §5): rotation, scale and deformation change slowly."""
+
+import numpy as np
+
+from reconstruction.arrays import Array
+from reconstruction.camera import left_matrix
+from reconstruction.state import POSE, State, join
+from reconstruction.window.energy import Energy
+from reconstruction.window.marginal import Previous
+from reconstruction.window.normal import Normal, diagonals
+
+
+def chain_of(energy: Energy, state: State, before: Previous | None) -> tuple[State, Array | None]:
+    """The window's frames, after the frame before them if the window is tied to it, and what that one knows of Λ'."""
+    if before is None or not energy.tied:
+        return state, None
+    return join([before.state, state]), before.information
+
+
+def add_smoothness_value(value: Array, energy: Energy, state: State, before: Previous | None) -> None:
+    """Add to the value (n,) of each frame the cost of its change since the frame before."""
+    chain, information = chain_of(energy, state, before)
+    if len(chain) > 1:
+        value[len(state) - len(chain) + 1 :] += smoothness(energy, chain[:-1], chain[1:], information)
+
+
+def smoothness(energy: Energy, earlier: State, later: State, information: Array | None = None) -> Array:
+    """Change (n,) between frames and their successors: λ_q‖Δq‖² + λ_s(Δ log s)² + that of Λ' (`deformation_change`).
+
+    With `information` H (k, k) the latter is ΔΛ'ᵀ H ΔΛ' for the first of them.
+    """
+    change, cost, _ = deformation_change(energy, earlier, later)
+    if information is not None:
+        cost[0] = change[0] @ information @ change[0]
+    return (
+        energy.rotation * (quaternion_difference(earlier.q, later.q) ** 2).sum(axis=1)
+        + energy.scale * (later.log_s - earlier.log_s) ** 2
+        + cost
+    )
+
+
+def deformation_change(energy: Energy, earlier: State, later: State) -> tuple[Array, Array, Array]:
+    """Change ΔΛ' (n, k) of the free rows between successive frames, its cost (n,), weights on its squares (n or 1, k).
+
+    The cost is c = λ_γ‖ΔΛ'‖², or j log(1 + c/j) with jumps of size j, as of a heavy-tailed distribution.
+    """
+    change = (later.Lambda - earlier.Lambda)[:, energy.rows, :]
+    weights = energy.smoothness * np.ones(change.shape[1:])
+    change, weights = change.reshape(len(change), weights.size), weights.reshape(1, weights.size)
+    cost = (weights * change**2).sum(axis=1)
+    if energy.jump is not None:
+        weights = weights / (1 + cost / energy.jump)[:, None]
+        cost = energy.jump * np.log1p(cost / energy.jump)
+    return change, cost, weights
+
+
+def quaternion_difference(earlier: Array, later: Array) -> Array:
+    """Δq (n, 4) with the sign of `earlier` that is nearer: q and −q are the same rotation."""
+    nearer = np.where((earlier * later).sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
+    return later - nearer * earlier
+
+
+def quaternion_tangent(q: Array) -> Array:
+    """dq/dθ (n, 4, 3) of q ⊗ exp(θ/2) at θ = 0."""
+    return 0.5 * left_matrix(q)[..., 1:]
+
+
+def add_smoothness(normal: Normal, energy: Energy, state: State, before: Previous | None) -> None:
+    """Differences of neighbours inside the window, and of the oldest frame to the one that has left it."""
+    chain, information = chain_of(energy, state, before)
+    earlier, later = chain[:-1], chain[1:]
+    n, d = len(later), normal.gradient.shape[1]
+    if n == 0:
+        return
+    nearer = np.where((earlier.q * later.q).sum(axis=1) < 0, -1.0, 1.0)[:, None, None]
+    tangents = quaternion_tangent(chain.q)
+    J_earlier, J_later = -nearer * tangents[:-1], tangents[1:]
+    delta = quaternion_difference(earlier.q, later.q)[:, :, None]
+    change, weights = np.zeros((n, d)), np.zeros((n, d))
+    change[:, 5], weights[:, 5] = later.log_s - earlier.log_s, energy.scale
+    change[:, POSE:], _, weights[:, POSE:] = deformation_change(energy, earlier, later)
+    if information is not None:
+        weights[0, POSE:] = 0.0
+        normal.gradient[0, POSE:] += information @ change[0, POSE:]
+        normal.diagonal[0, POSE:, POSE:] += information
+    inner = slice(len(chain) - len(state), n)  # the others tie frames of the window to each other
+    for J, sign, frames in ((J_later, 1.0, slice(n)), (J_earlier, -1.0, inner)):
+        target = slice(len(state) - n, None) if sign > 0 else slice(len(state) - 1)
+        Jt = energy.rotation * J[frames].transpose(0, 2, 1)
+        normal.gradient[target, :3] += (Jt @ delta[frames])[:, :, 0]
+        normal.gradient[target, 5:] += sign * weights[frames, 5:] * change[frames, 5:]
+        normal.diagonal[target, :3, :3] += Jt @ J[frames]
+        diagonals(normal.diagonal[target])[:, 5:] += weights[frames, 5:]
+    normal.coupling[:, :3, :3] += energy.rotation * J_earlier[inner].transpose(0, 2, 1) @ J_later[inner]
+    diagonals(normal.coupling)[:, 5:] -= weights[inner, 5:]

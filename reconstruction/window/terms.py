@@ -1,0 +1,125 @@
+"""The terms of the energy (paper §5) and their derivatives, one function per term.
+
+Every term is a sum of squares; it returns its value, half its gradient and the Gauss-Newton approximation of half its
+Hessian, which is block tridiagonal over frames: smoothness couples neighbours, the other terms couple no frames.
+"""
+
+import numpy as np
+
+from reconstruction.arrays import Array
+from reconstruction.basis.constraints import ALL_ROWS, CoarseEdges
+from reconstruction.state import POSE, State
+from reconstruction.window import statistics
+from reconstruction.window.energy import Energy
+from reconstruction.window.marginal import Previous
+from reconstruction.window.normal import Normal, diagonals
+from reconstruction.window.smoothness import add_smoothness, add_smoothness_value
+from reconstruction.window.statistics import Statistics
+
+HAT = np.zeros((3, 3, 3))  # HAT[k] = [e_k]×
+for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+    HAT[i, k, j], HAT[i, j, k] = 1.0, -1.0
+
+
+def evaluate(energy: Energy, data: Statistics, state: State, before: Previous | None) -> Array:
+    """Energy (n,) per frame; `before` is the frame that has left the window."""
+    free = (state.Lambda - energy.centre)[:, energy.rows]
+    value = statistics.value(data, state.matrices()) + (energy.rest * free**2).sum(axis=(1, 2))
+    if energy.edges is not None:
+        strain = energy.edges.strain(energy.edges.vectors(state.Lambda))
+        value += energy.inextensibility * (strain**2).mean(axis=1)
+    add_smoothness_value(value, energy, state, before)
+    return value
+
+
+def linearise(
+    energy: Energy, data: Statistics, state: State, before: Previous | None, value: Array | None = None
+) -> Normal:
+    """Value (n,), unless given, gradient and Gauss-Newton blocks of the whole energy at a state."""
+    value = evaluate(energy, data, state, before) if value is None else value
+    rows = energy.rows if energy.bending is None else ALL_ROWS
+    normal = Normal.zero(value, POSE + len(rows) * state.Lambda.shape[2])
+    add_data(normal, rows, data, state)
+    if energy.edges is not None:
+        add_inextensibility(normal, rows, energy.inextensibility, energy.edges, state)
+    if energy.bending is not None:
+        normal = by_row_tau(normal, energy.bending.slope(state.Lambda))
+    add_rest(normal, energy, state)
+    add_smoothness(normal, energy, state, before)
+    if not energy.free_scale:
+        normal.gradient[:, 5] = 0.0
+        normal.diagonal[:, 5, :] = normal.diagonal[:, :, 5] = 0.0
+        normal.diagonal[:, 5, 5] = 1.0
+        normal.coupling[:, 5, :] = normal.coupling[:, :, 5] = 0.0
+    return normal
+
+
+def data_normal(data: Statistics, state: State) -> Normal:
+    """The data term alone, all rows of Λ free."""
+    normal = Normal.zero(np.zeros(len(state)), POSE + state.Lambda[0].size)
+    add_data(normal, ALL_ROWS, data, state)
+    return normal
+
+
+def add_data(normal: Normal, free_rows: tuple[int, ...], data: Statistics, state: State) -> None:
+    """Reprojection, quadratic in M: pose by the chain rule, Λ as a Kronecker product of AᵀA and the Υ part of the sums."""
+    n, r = len(state), state.Lambda.shape[2]
+    rows = list(free_rows)
+    M = state.matrices()
+    A = M[:, :, :3]
+    pose = np.zeros((n, POSE, 3, 4 + r))  # dM/d(θ, t, log s)
+    X = np.concatenate([np.broadcast_to(np.eye(3), (n, 3, 3)), state.Lambda], axis=2)
+    pose[:, :3, :, :-1] = A[:, None] @ (HAT @ X[:, None])
+    pose[:, 3, 0, -1] = pose[:, 4, 1, -1] = 1.0
+    pose[:, 5, :, :-1] = M[:, :, :-1]
+    slope = statistics.gradient(data, M)
+    curved = statistics.apply(data, pose)
+    flat = pose.reshape(n, POSE, -1)
+    normal.gradient[:, :POSE] += (flat @ slope.reshape(n, -1, 1))[:, :, 0]
+    normal.diagonal[:, :POSE, :POSE] += flat @ curved.reshape(n, POSE, -1).transpose(0, 2, 1)
+    if not rows or not r:
+        return
+    free = A[:, :, rows]
+    k = len(rows) * r
+    normal.gradient[:, POSE:] += (free.transpose(0, 2, 1) @ slope[:, :, 3:-1]).reshape(n, k)
+    mixed = (free.transpose(0, 2, 1)[:, None] @ curved[:, :, :, 3:-1]).reshape(n, POSE, k)
+    normal.diagonal[:, :POSE, POSE:] += mixed
+    normal.diagonal[:, POSE:, :POSE] += mixed.transpose(0, 2, 1)
+    both = free[:, :, None, :, None] * free[:, None, :, None, :]  # (n, 3, 3, rows, rows)
+    twice = both + both.transpose(0, 2, 1, 3, 4)
+    factors = np.stack([both[:, 0, 0] + both[:, 1, 1], -twice[:, 0, 2], -twice[:, 1, 2], both[:, 2, 2]], axis=1)
+    modes = data.gram[:, :, 3:-1, 3:-1]
+    kron = (factors.reshape(n, 4, -1).transpose(0, 2, 1) @ modes.reshape(n, 4, -1)).reshape(n, len(rows), len(rows), r, r)
+    by_rows = normal.diagonal[:, POSE:, POSE:].reshape(n, len(rows), r, len(rows), r)  # a view
+    by_rows += kron.transpose(0, 1, 3, 2, 4)
+
+
+def by_row_tau(normal: Normal, slope: Array) -> Normal:
+    """Normal equations in row τ alone, when all rows depend on it with slope (n, 3r, r): the chain rule."""
+    n, d, r = len(slope), normal.gradient.shape[1], slope.shape[2]
+    J = np.zeros((n, d, POSE + r))
+    J[:, :POSE, :POSE] = np.eye(POSE)
+    J[:, POSE:, POSE:] = slope
+    Jt = J.transpose(0, 2, 1)
+    gradient = (Jt @ normal.gradient[:, :, None])[:, :, 0]
+    return Normal(normal.value, gradient, Jt @ normal.diagonal @ J, np.zeros((n - 1, POSE + r, POSE + r)))
+
+
+def add_rest(normal: Normal, energy: Energy, state: State) -> None:
+    """λ_0‖Λ' − Λ̄'‖²: the pull to the rest shape."""
+    free = (state.Lambda - energy.centre)[:, energy.rows, :]
+    weights = np.broadcast_to(energy.rest, free.shape).reshape(len(state), -1)
+    normal.gradient[:, POSE:] += weights * free.reshape(len(state), -1)
+    diagonals(normal.diagonal)[:, POSE:] += weights
+
+
+def add_inextensibility(normal: Normal, free_rows: tuple[int, ...], kappa: float, edges: CoarseEdges, state: State) -> None:
+    """κ mean_e ρ_e²: edges of the coarse mesh keep their rest length."""
+    n, count = len(state), len(edges.length)
+    vectors = edges.vectors(state.Lambda)
+    strain = edges.strain(vectors)
+    direction = (vectors / edges.length)[:, free_rows, None, :]
+    J = (direction * edges.modes).reshape(n, -1, count)
+    weight = kappa / count
+    normal.gradient[:, POSE:] += weight * (J @ strain[:, :, None])[:, :, 0]
+    normal.diagonal[:, POSE:, POSE:] += weight * (J @ J.transpose(0, 2, 1))
