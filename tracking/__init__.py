@@ -1,5 +1,14 @@
 """Video in, point observations out: frames, corners, pyramidal LK, consistency, W^f and h^f."""
 
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.float32]
+Indices = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+Image = NDArray[np.uint8]  # (H, W, 3) BGR, or (H, W) gray levels or a mask
+
 
 class TrackingError(ValueError):
     """A video, region or track file that cannot be used; the message says what is wrong and what is needed.

@@ -1,18 +1,15 @@
-"""What the points looked like in the reference frame, and where that is now, to a fraction of a pixel."""
+"""Patches of the reference frame around the points, aligned to a frame to a fraction of a pixel."""
 
 from dataclasses import dataclass
 from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Patches = NDArray[np.float32]
-Indices = NDArray[np.int64]
+from tracking import Array, Floats, Indices
 
 MAX_STEP = 2.0  # patch pixels; beyond, the linear model of the patch does not hold
-SETTLED = 0.05  # patch pixels; after a shorter step a point is where it belongs
+CONVERGED = 0.05  # patch pixels; a shorter step ends the search
 FLAT = 1e-3  # grey levels of contrast below which a patch has no appearance
 
 
@@ -43,7 +40,7 @@ class Appearance:
         radius: patches have (2 radius + 1)² samples.
     """
 
-    def __init__(self, image: Patches, points_px: Array, radius: int) -> None:
+    def __init__(self, image: Floats, points_px: Array, radius: int) -> None:
         steps = np.arange(-radius, radius + 1, dtype=np.float32)
         u, v = np.meshgrid(steps, steps)
         self._grid = np.stack([u.ravel(), v.ravel(), np.ones(u.size, np.float32)])
@@ -65,7 +62,7 @@ class Appearance:
         normal[:, (0, 1), (0, 1)] += 1e-3 * np.trace(normal, axis1=1, axis2=2)[:, None] + 1e-9
         self._inverse = np.linalg.inv(normal)
 
-    def align(self, image: Patches, points_px: Array, affine: Array, which: Indices, iterations: int) -> Alignment:
+    def align(self, image: Floats, points_px: Array, affine: Array, which: Indices, iterations: int) -> Alignment:
         """Move the points `which` to where the picture looks most like their patches.
 
         Args:
@@ -84,13 +81,13 @@ class Appearance:
             length = np.linalg.norm(step, axis=1)
             step /= np.maximum(1.0, length / MAX_STEP)[:, None]
             points[moving] -= (affine[moving] @ step[:, :, None])[:, :, 0]
-            moving = moving[length > SETTLED]  # a shorter step changes neither score nor slope
+            moving = moving[length > CONVERGED]  # a shorter step changes neither score nor slope
             if len(moving) == 0:
                 break
             score[moving], slope = self._compare(image, points[moving], affine[moving], which[moving])
         return Alignment(points, score, before)
 
-    def _compare(self, image: Patches, points: Array, affine: Array, which: Indices) -> tuple[Array, Array]:
+    def _compare(self, image: Floats, points: Array, affine: Array, which: Indices) -> tuple[Array, Array]:
         """Score (n,) and half its falling slope (n, 2) where the picture is sampled for the points `which`."""
         seen = _sample(image, points, affine, self._grid)
         contrast = _centre(seen)
@@ -99,20 +96,20 @@ class Appearance:
         return products[:, 0], products[:, 1:]
 
 
-def _sample(image: Patches, centres: Array, affine: Array, grid: Patches) -> Patches:
+def _sample(image: Floats, centres: Array, affine: Array, grid: Floats) -> Floats:
     """The picture (n, m) at the m grid points (u, v, 1) mapped by each affine map about its centre."""
     if len(centres) == 0:
         return np.empty((0, grid.shape[1]), np.float32)
     maps = np.concatenate([affine, centres[:, :, None]], axis=2).astype(np.float32)
     x, y = maps[:, 0] @ grid, maps[:, 1] @ grid
-    return cast(Patches, cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
+    return cast(Floats, cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
 
 
-def _centre(patches: Patches) -> Patches:
+def _centre(patches: Floats) -> Floats:
     """Make the mean of each patch (n, m) zero, in place; their norms (n, 1)."""
     patches -= patches.mean(axis=1, keepdims=True)
     return np.maximum(np.sqrt(_dot(patches, patches)), FLAT)[:, None]
 
 
-def _dot(a: Patches, b: Patches) -> Patches:
-    return cast(Patches, np.einsum("ij,ij->i", a, b))
+def _dot(a: Floats, b: Floats) -> Floats:
+    return cast(Floats, np.einsum("ij,ij->i", a, b))

@@ -8,20 +8,12 @@ from pathlib import Path
 from time import monotonic
 from typing import Protocol, cast
 
-# FFmpeg reads its level when the first file is opened; both would write past us to the terminal.
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
-
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from tracking import TrackingError
+from tracking import Image, TrackingError
 from tracking.images import ImageFiles
 
-cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # in case cv2 was imported before us
-
-Image = NDArray[np.uint8]
 Say = Callable[[str], None]
 
 PATIENCE_S = 60.0  # a broken stream is waited for

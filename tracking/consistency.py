@@ -3,20 +3,17 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
+from tracking import Array, Flags, Indices
 
 NEIGHBOURS = 10  # of which a third may be wrong and six numbers are still well determined
 STIFFNESS = 0.02  # pull towards the prior map, in units of the neighbours' mean square distance
-MIN_SUPPORT = 3.0  # trusted neighbours below which nothing can be said about a point
+MIN_SUPPORT = 3.0  # sum of the neighbours' weights; below, a point is not judged
 ROUNDS = 5  # of re-weighting; 4 miss 2 % of the outliers where these are 30 % of the points, 5 miss 0.3 %
-SETTLED = 0.02  # change of all weights below which no further round is needed
-NOISE_PX = 0.5  # least scale of disagreement: tracking noise and curvature between neighbours
-CHAOS = 0.1  # greatest scale, in neighbour distances: where all points disagree, none is excused by the others
-OUTLIER = 4.0  # scales from the neighbours' prediction
+CONVERGED = 0.02  # change of all weights below which no further round is needed
+NOISE_PX = 0.5  # least scale of the residuals: tracking noise and curvature between neighbours
+GREATEST_SCALE = 0.1  # of the residuals, in neighbour distances: where all points disagree, all are outliers
+OUTLIER = 4.0  # scales; a larger residual is an outlier
 
 
 @dataclass(frozen=True)
@@ -25,11 +22,11 @@ class LocalMotion:
 
     Attributes:
         affine: (P, 2, 2) linear part of the local map.
-        fitted_px: (P, 2) where the neighbours say the point is, without asking the point itself.
+        fitted_px: (P, 2) each point as its neighbours' map predicts it; the point itself is not among them.
         support: (P,) sum of the neighbours' weights.
-        consistent: (P,) whether the point is where its neighbours say, or nothing can be said.
-        trust: (P,) what each point's word counts in the end.
-        scale_px: usual disagreement.
+        consistent: (P,) whether the point is near the prediction, or has too few neighbours for one.
+        trust: (P,) robust weight of each point in the end.
+        scale_px: robust scale of the residuals.
     """
 
     affine: Array
@@ -57,10 +54,10 @@ class Surroundings:
         self._columns = np.ascontiguousarray(self.neighbours.T)
         x, y = (column[self._columns] - column for column in reference_px.T)
         self._offsets = np.stack([x, y, x * x, x * y, y * y], axis=1)
-        self._limit = CHAOS * float(np.median(np.hypot(x, y).max(axis=0, initial=0.0)))
+        self._limit = GREATEST_SCALE * float(np.median(np.hypot(x, y).max(axis=0, initial=0.0)))
 
     def motion(self, current_px: Array, weight: Array, prior: Array) -> LocalMotion:
-        """Robust local affine maps from the reference to now; points that disagree lose their say.
+        """Local affine maps from the reference to now, by iteratively re-weighted least squares.
 
         Args:
             current_px: (P, 2) the points now; NaN where unknown.
@@ -69,7 +66,7 @@ class Surroundings:
         """
         moved = np.where(weight > 0, (current_px - self._reference).T, 0.0)
         products = self._products(moved, slice(None))
-        # By what is known, not by what is trusted: else a gross outlier that upsets its neighbours is excused.
+        # Counted in weights, not in trust: a gross outlier that lowers its neighbours' trust is still judged.
         support = weight[self._columns].sum(axis=0)
         judged = (weight > 0) & (support >= MIN_SUPPORT)
         trust = weight
@@ -80,13 +77,13 @@ class Surroundings:
             if judged.any():
                 scale = max(scale, min(1.4826 * float(np.median(residual[judged])), self._limit))
             before, trust = trust, np.where(judged, weight / (1.0 + (residual / (2.0 * scale)) ** 2), weight)
-            if np.abs(trust - before).max(initial=0.0) < SETTLED:
+            if np.abs(trust - before).max(initial=0.0) < CONVERGED:
                 break
         consistent = ~judged | (residual < OUTLIER * scale)
         return LocalMotion(affine, self._reference + fitted.T, support, consistent, trust, scale)
 
     def agree(self, current_px: Array, which: Indices, motion: LocalMotion) -> Flags:
-        """Whether points found since move like their neighbours, each other included: (n,), also if nothing can be said.
+        """Whether points found since move like their neighbours, each other included: (n,); True for those not judged.
 
         Args:
             current_px: (P, 2) the points now, NaN where unknown.
@@ -104,12 +101,12 @@ class Surroundings:
             residual = np.hypot(*(moved[:, which] - fitted))
             before, now = trust[which], np.where(judged, 1.0 / (1.0 + (residual / (2.0 * motion.scale_px)) ** 2), 1.0)
             trust[which] = now
-            if np.abs(now - before).max(initial=0.0) < SETTLED:
+            if np.abs(now - before).max(initial=0.0) < CONVERGED:
                 break
-        return np.asarray(~judged | (residual < OUTLIER * motion.scale_px))
+        return ~judged | (residual < OUTLIER * motion.scale_px)
 
     def _products(self, moved: Array, rows: slice | Indices) -> Array:
-        """What the sums of a fit are taken of: (k, 11, n) for displacements (2, P)."""
+        """The terms that a fit sums up over neighbours: (k, 11, n), for displacements (2, P)."""
         columns, offsets = self._columns[:, rows], self._offsets[:, :, rows]
         u, v = moved[0][columns], moved[1][columns]
         x, y = offsets[:, 0], offsets[:, 1]

@@ -1,15 +1,11 @@
-"""Well-spread corners: the points whose appearance pins their place."""
+"""Well-spread corners, the points to track."""
 
 from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from tracking import TrackingError
-
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
+from tracking import Array, Flags, Image, TrackingError
 
 MIN_CORNERS = 12  # fewer carry no shape
 MIN_SPACING_PX = 5.0  # closer corners share most of their patch
@@ -59,7 +55,7 @@ def detect_corners(gray: Image, region: Image, max_points: int = 800) -> Array:
     return corners[:max_points]
 
 
-def _quality(gray: Image, allowed: NDArray[np.bool_], spacing: float) -> Array:
+def _quality(gray: Image, allowed: Flags, spacing: float) -> Array:
     """The corner response (H, W) relative to the best a few spacings around; 0 where no corner may be."""
     response = cv2.cornerMinEigenVal(gray, BLOCK_PX, ksize=3)
     response[~allowed | (response < NOISE_RESPONSE * _noise(gray, allowed) ** 2)] = 0.0
@@ -67,9 +63,9 @@ def _quality(gray: Image, allowed: NDArray[np.bool_], spacing: float) -> Array:
     return np.where(response >= LOCAL_QUALITY * best, response / np.maximum(best, 1e-12), 0.0)
 
 
-def _noise(gray: Image, allowed: NDArray[np.bool_]) -> float:
+def _noise(gray: Image, allowed: Flags) -> float:
     """Standard deviation of the noise in grey levels (Immerkaer 1996), where there is least texture."""
-    mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)  # blind to anything smooth
+    mask = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32)  # zero on linear gradients
     energy = cv2.blur(cv2.filter2D(gray, cv2.CV_32F, mask) ** 2, (15, 15))
     return float(np.clip(np.sqrt(np.percentile(energy[allowed], 10)) / 6.0, *NOISE_RANGE))
 

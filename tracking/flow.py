@@ -1,16 +1,12 @@
-"""Optical flow of points, forward and backward, led by a few well-spread guides."""
+"""Optical flow of points, checked forward and backward, and started from the motion of a few well-spread guides."""
 
 from dataclasses import dataclass
 from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
-Indices = NDArray[np.int64]
-Flags = NDArray[np.bool_]
+from tracking import Array, Flags, Image, Indices
 
 WINDOW_PX = 15
 # The guides find the motion, the others only refine it. With all points on all levels, 21 % of kinect_paper's
@@ -20,9 +16,9 @@ WINDOW_PX = 15
 GUIDES = 150
 GUIDE_WINDOW_PX = 11  # of the half picture
 GUIDE_LEVELS = 3  # halvings of a half picture 320 px wide
-VOTES = 8  # guides whose median motion a point starts from
+NEAREST_GUIDES = 8  # guides whose median motion a point starts from
 RETURN_PX = 1.0  # forward and backward again must end so near to the start
-SETTLED_PX, RETURN_SETTLED_PX = 0.03, 0.1  # shorter steps end the search; what is found is aligned to its appearance later
+CONVERGED_PX, RETURN_CONVERGED_PX = 0.03, 0.1  # shorter steps end the search; alignment to appearance follows
 MOST_STEPS = 30
 
 
@@ -70,7 +66,7 @@ def follow(before: Grays, now: Grays, points_px: Array) -> Array:
     levels = GUIDE_LEVELS + max(0, round(np.log2(max(now.half.shape) / 320.0)))
     moved, good = both_ways(before.half, now.half, guides / 2, np.zeros_like(guides), GUIDE_WINDOW_PX, levels)
     motion = (2 * moved - guides)[good]
-    if len(motion) < VOTES:
+    if len(motion) < NEAREST_GUIDES:
         guess = np.zeros_like(points_px)
         levels += 1
     else:
@@ -95,7 +91,7 @@ def both_ways(before: Image, now: Image, points: Array, guess: Array, window: in
         winSize=size,
         maxLevel=levels,
         flags=guessed,
-        criteria=(until, MOST_STEPS, SETTLED_PX),
+        criteria=(until, MOST_STEPS, CONVERGED_PX),
     )
     back, returned, _ = cv2.calcOpticalFlowPyrLK(
         now,
@@ -105,7 +101,7 @@ def both_ways(before: Image, now: Image, points: Array, guess: Array, window: in
         winSize=size,
         maxLevel=levels,
         flags=guessed,
-        criteria=(until, MOST_STEPS, RETURN_SETTLED_PX),
+        criteria=(until, MOST_STEPS, RETURN_CONVERGED_PX),
     )
     good = (found[:, 0] > 0) & (returned[:, 0] > 0) & (np.linalg.norm(back - start, axis=1) < RETURN_PX)
     return np.asarray(there, np.float64), np.asarray(good, np.bool_)
@@ -113,5 +109,7 @@ def both_ways(before: Image, now: Image, points: Array, guess: Array, window: in
 
 def _median_of_nearest(points: Array, guides: Array, motion: Array) -> Array:
     near, far = guides.astype(np.float32), points.astype(np.float32)
-    nearest = cv2.batchDistance(far, near, cv2.CV_32F, normType=cv2.NORM_L2SQR, K=VOTES)[1]
-    return cast(Array, np.sort(motion.T[:, nearest], axis=2)[:, :, VOTES // 2 - 1 : VOTES // 2 + 1].mean(axis=2).T)
+    nearest = cv2.batchDistance(far, near, cv2.CV_32F, normType=cv2.NORM_L2SQR, K=NEAREST_GUIDES)[1]
+    return cast(
+        Array, np.sort(motion.T[:, nearest], axis=2)[:, :, NEAREST_GUIDES // 2 - 1 : NEAREST_GUIDES // 2 + 1].mean(axis=2).T
+    )

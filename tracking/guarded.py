@@ -1,4 +1,4 @@
-"""A tracker that knows when it has lost the surface, and finds it again."""
+"""A point tracker that detects the loss of the surface, and relocalises it."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -6,31 +6,28 @@ from enum import Enum
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from tracking import Array, Image
 from tracking.klt import Observation, PointTracker
-from tracking.relocation import Relocation
-
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
+from tracking.relocalisation import Relocalisation
 
 # A hand over the sheet leaves points around it, and comes within several frames; a cut leaves 0 to 20 % at once.
-JUST_NOW = 3  # frames whose best share of points seen is compared: a surface that leaves takes longer
-COLLAPSE = 0.5  # of that share: less in one frame, and ...
-FEW = 0.4  # ... less than this share of all points, looks like a cut
-GONE = 0.1  # share of the points below which the surface is lost, however slowly it went
-FEWEST = 12  # points, below which it is lost, too
-FOUND = 0.2  # share of the points that must look right to believe that the surface is back
+RECENT_FRAMES = 3  # whose best share of points seen is compared: a surface that leaves takes longer
+COLLAPSED_SHARE = 0.5  # of that share: less in one frame, and ...
+FEW_SHARE = 0.4  # ... less than this share of all points, looks like a cut
+LOST_SHARE = 0.1  # share of the points below which the surface is lost, however slowly it went
+MIN_POINTS = 12  # fewer, and it is lost, too
+FOUND_SHARE = 0.2  # share of the points that must look right to believe that the surface is back
 SEARCH_EVERY_FRAME = 15  # so many frames it is searched for in each frame; later, to save time, ...
 SEARCH_EVERY = 5  # ... in one out of so many
-SAME = 0.75  # of the share seen before: so many at the same place need no search
+SAME_SHARE = 0.75  # of the share seen before: so many at the same place need no search
 
 
 # What is around the surface tells a hand that comes quickly from a cut, where nothing stays as it was.
 CELLS = (32, 24)  # of the picture that are compared: coarse enough for a camera that is not quite still
-LIKE = 10.0  # grey levels by which a cell may have changed
-STAYED = 0.5  # share of the cells around the surface: less, and it was a cut
-AROUND = 0.1  # share of the picture that must lie around the surface for this to say anything
+CELL_CHANGE = 10.0  # grey levels by which a cell may have changed
+SAME_CELLS = 0.5  # share of the cells around the surface: less, and it was a cut
+LEAST_BACKGROUND = 0.1  # share of the picture that must lie around the surface for this to say anything
 
 
 class Change(Enum):
@@ -59,9 +56,9 @@ class Guarded:
 
 
 class GuardedTracker:
-    """Follows points as `PointTracker` does, and says when there is nothing to follow any more.
+    """Tracks points as `PointTracker` does, and detects when the surface is lost.
 
-    While the surface is lost, it is looked for where it was last seen, and by its features in the whole picture.
+    While it is lost, it is searched for where it was last seen, and by its features in the whole picture.
 
     Args:
         image_bgr: (H, W, 3) uint8 reference frame.
@@ -76,8 +73,8 @@ class GuardedTracker:
         self._reference = self._image = image_bgr  # the first, and the last that showed the surface
         self._points = points_px
         self._tracker = PointTracker(image_bgr, points_px)
-        self._relocation: Relocation | None = None
-        self._shares = deque([1.0], JUST_NOW)  # of the points seen in the last frames
+        self._relocalisation: Relocalisation | None = None
+        self._shares = deque([1.0], RECENT_FRAMES)  # of the points seen in the last frames
         self._last_px = points_px.copy()  # where the surface was last: seen or predicted
         self.lost = False
         self.frames_lost = 0
@@ -94,12 +91,12 @@ class GuardedTracker:
         observation = self._tracker.track(image_bgr, predicted_px)
         share = float(observation.visible.mean())
         just_now = max(self._shares)
-        jumped = share < COLLAPSE * just_now and share < FEW
-        if jumped or share < GONE or observation.visible.sum() < FEWEST:
+        jumped = share < COLLAPSED_SHARE * just_now and share < FEW_SHARE
+        if jumped or share < LOST_SHARE or observation.visible.sum() < MIN_POINTS:
             self.lost, self.frames_lost = True, 1
             how = f"only {share:.0%} of the points are seen"
             how += f", {just_now:.0%} just before: a cut or a jump" if jumped else ": it is covered or has left the picture"
-            cut = jumped and not stayed(self._image, image_bgr, self._last_px)
+            cut = jumped and not same_background(self._image, image_bgr, self._last_px)
             return Guarded(self._nothing(), Change.LOST, how, cut)
         self._shares.append(share)
         self._image = image_bgr
@@ -111,19 +108,19 @@ class GuardedTracker:
         self.frames_lost += 1
         found = self._tracker.resume(image_bgr, self._last_px)
         how = "where it was"
-        if self._good(found, SAME * max(self._shares)) or not self._due:
-            enough = self._good(found, FOUND)
+        if self._good(found, SAME_SHARE * max(self._shares)) or not self._due:
+            enough = self._good(found, FOUND_SHARE)
         else:
-            if self._relocation is None:
-                self._relocation = Relocation(self._reference, self._points)
-            places = self._relocation.find(image_bgr)
+            if self._relocalisation is None:
+                self._relocalisation = Relocalisation(self._reference, self._points)
+            places = self._relocalisation.find(image_bgr)
             if places is not None:
                 relocated = self._tracker.resume(image_bgr, places)
                 if relocated.visible.sum() > found.visible.sum():
                     found, how = relocated, "by its features"
                 else:  # the tracker goes on from what is kept
                     found = self._tracker.resume(image_bgr, self._last_px)
-            enough = self._good(found, FOUND)
+            enough = self._good(found, FOUND_SHARE)
         if not enough:
             return Guarded(self._nothing())
         share = float(found.visible.mean())
@@ -140,13 +137,13 @@ class GuardedTracker:
         return self.frames_lost <= SEARCH_EVERY_FRAME or self.frames_lost % SEARCH_EVERY == 0
 
     def _good(self, observation: Observation, share: float) -> bool:
-        return observation.visible.mean() >= share and int(observation.visible.sum()) >= FEWEST
+        return observation.visible.mean() >= share and int(observation.visible.sum()) >= MIN_POINTS
 
     def _nothing(self) -> Observation:
         return Observation(np.full_like(self._points, np.nan), np.zeros(len(self._points), np.bool_))
 
 
-def stayed(before_bgr: Image, now_bgr: Image, surface_px: Array) -> bool:
+def same_background(before_bgr: Image, now_bgr: Image, surface_px: Array) -> bool:
     """Whether most of what is around a surface, at (P, 2) px in the picture before, looks as it did; if there is enough."""
     surface = np.zeros(before_bgr.shape[:2], np.uint8)
     hull = cv2.convexHull(surface_px[np.isfinite(surface_px).all(axis=1)].astype(np.float32).reshape(-1, 1, 2))
@@ -156,4 +153,4 @@ def stayed(before_bgr: Image, now_bgr: Image, surface_px: Array) -> bool:
     )
     around = inside == 0
     change = np.abs(before.astype(np.float64) - now).max(axis=2)[around]
-    return around.mean() > AROUND and bool(np.mean(change < LIKE) > STAYED)
+    return around.mean() > LEAST_BACKGROUND and bool(np.mean(change < CELL_CHANGE) > SAME_CELLS)

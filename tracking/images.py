@@ -6,11 +6,8 @@ from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from tracking import TrackingError
-
-Image = NDArray[np.uint8]
+from tracking import Image, TrackingError
 
 
 class ImageFiles:

@@ -3,17 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from tracking import Array, Flags, Floats, Image, Indices
 from tracking.appearance import Appearance
 from tracking.consistency import MIN_SUPPORT, LocalMotion, Surroundings
 from tracking.flow import Grays, follow, spread_order
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.int64]
-Image = NDArray[np.uint8]
-Picture = NDArray[np.float32]
 
 PATCH_RADIUS = 7
 BORDER_PX = 4.0  # nearer to the border a point counts as having left
@@ -47,13 +41,13 @@ class Observation:
 
 @dataclass(frozen=True)
 class _Begun:
-    """What is known of a frame before there is a prediction: its picture, gray, the flow to it, fine and coarse."""
+    """What is computed of a frame before there is a prediction: its picture, gray, the flow to it, fine and coarse."""
 
     image: Image
     grays: Grays
     points: Array
-    fine: Picture
-    coarse: Picture
+    fine: Floats
+    coarse: Floats
 
 
 class PointTracker:
@@ -137,7 +131,7 @@ class PointTracker:
             weight[helped] = PREDICTION_WEIGHT
         return self._surroundings.motion(points, weight, self._affine)
 
-    def _refine(self, fine: Picture, coarse: Picture, points: Array, motion: LocalMotion) -> Array:
+    def _refine(self, fine: Floats, coarse: Floats, points: Array, motion: LocalMotion) -> Array:
         """Remove the drift of tracked points; drop those that look different."""
         points = points.copy()
         seen = np.flatnonzero(np.isfinite(points[:, 0]))
@@ -147,7 +141,7 @@ class PointTracker:
         # Blur makes fine patches unlike, those of the half picture much less; wrong places are unlike both.
         seen, before = seen[~clear], found.score_before[~clear]
         found = self._coarse.align(coarse, points[seen] / 2.0, motion.affine[seen], seen, REFINE_STEPS)
-        # Nobody vouches for a point without neighbours: it must look right by itself.
+        # A point that its neighbours do not check must look more alike.
         keep = np.where(motion.support[seen] >= MIN_SUPPORT, KEEP_SCORE, RETRIEVE_SCORE)
         same = (before > keep) | ((found.score_before > keep) & (before > 0.0))
         points[seen[~same]] = np.nan
@@ -187,8 +181,8 @@ class PointTracker:
         count = seen.sum(axis=1)[:, None]
         return np.where(count > 0, local / np.maximum(count, 1), np.median(miss[known], axis=0))
 
-    def _retrieve(self, fine: Picture, coarse: Picture, points: Array, expected: Array, motion: LocalMotion) -> Array:
-        """Take up points near where they are expected: they look right and move like their neighbours."""
+    def _retrieve(self, fine: Floats, coarse: Floats, points: Array, expected: Array, motion: LocalMotion) -> Array:
+        """Re-acquire points near where they are expected, if they look alike and move like their neighbours."""
         sought = np.flatnonzero(_inside(expected, fine.shape))
         if len(sought) == 0:
             return points
@@ -211,6 +205,6 @@ def _inside(points: Array, shape: tuple[int, ...]) -> Flags:
     return inside[:, 0] & inside[:, 1]
 
 
-def _pictures(grays: Grays) -> tuple[Picture, Picture]:
+def _pictures(grays: Grays) -> tuple[Floats, Floats]:
     """The picture and its half, as float32."""
     return grays.full.astype(np.float32), grays.half.astype(np.float32)

@@ -5,14 +5,11 @@ from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from tracking import TrackingError
+from tracking import Image, TrackingError
 
 
-def region_mask(
-    size: tuple[int, int], roi: tuple[int, int, int, int] | None = None, mask: Path | None = None
-) -> NDArray[np.uint8]:
+def region_mask(size: tuple[int, int], roi: tuple[int, int, int, int] | None = None, mask: Path | None = None) -> Image:
     """Where points are looked for: (H, W) uint8, 255 inside.
 
     Args:
@@ -40,7 +37,7 @@ def region_mask(
     return region
 
 
-def _read_mask(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
+def _read_mask(path: Path, size: tuple[int, int]) -> Image:
     if not path.is_file():
         raise TrackingError(f"no mask file {path}; check the path")
     encoded = np.fromfile(path, np.uint8)
@@ -52,4 +49,4 @@ def _read_mask(path: Path, size: tuple[int, int]) -> NDArray[np.uint8]:
         raise TrackingError(
             f"the mask {path} has {found[0]}x{found[1]} px, the video {size[0]}x{size[1]}; they must be equal"
         )
-    return np.where(cast(NDArray[np.uint8], picture) > 127, 255, 0).astype(np.uint8)
+    return np.where(cast(Image, picture) > 127, 255, 0).astype(np.uint8)

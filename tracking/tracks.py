@@ -9,9 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking import TrackingError
-
-Array = NDArray[np.float64]
+from tracking import Array, Flags, Indices, TrackingError
 
 
 @dataclass(frozen=True)
@@ -30,10 +28,10 @@ class Tracks:
     """
 
     W: Array
-    visible: NDArray[np.bool_]
+    visible: Flags
     K: Array | None = None
     S_gt: Array | None = None
-    gt_frames: NDArray[np.int64] | None = None
+    gt_frames: Indices | None = None
 
     def __post_init__(self) -> None:
         if self.W.ndim != 3 or self.W.shape[1] != 2 or 0 in self.W.shape:
@@ -107,7 +105,7 @@ class Truth:
 
     W_px: Array
     S: Array
-    frames: NDArray[np.int64]
+    frames: Indices
     K: Array | None = None
 
     def __post_init__(self) -> None:
@@ -171,7 +169,7 @@ def _numbers(name: str, arrays: Mapping[str, NDArray[Any]]) -> Array:
     return array.astype(np.float64)
 
 
-def _flags(name: str, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_] | None:
+def _flags(name: str, arrays: Mapping[str, NDArray[Any]]) -> Flags | None:
     if name not in arrays:
         return None
     array = arrays[name]
@@ -180,7 +178,7 @@ def _flags(name: str, arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_] |
     return array.astype(bool)
 
 
-def _frame_numbers(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64] | None:
+def _frame_numbers(arrays: Mapping[str, NDArray[Any]]) -> Indices | None:
     if "gt_frames" not in arrays:
         return None
     numbers = _numbers("gt_frames", arrays)
@@ -198,7 +196,7 @@ def _check_intrinsics(K: Array | None) -> None:
         raise TrackingError("K is no camera matrix; its focal lengths K[0, 0] and K[1, 1] must be positive")
 
 
-def _check_truth(S: Array, frames: NDArray[np.int64], points: int) -> None:
+def _check_truth(S: Array, frames: Indices, points: int) -> None:
     if S.ndim != 3 or S.shape[1:] != (3, points) or len(S) == 0:
         raise _wrong_shape("S_gt", S, f"(true frames, 3, {points}) as there are {points} points")
     if not np.isfinite(S).all():

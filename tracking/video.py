@@ -12,12 +12,9 @@ from typing import Self, cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from tracking import TrackingError
+from tracking import Image, TrackingError
 from tracking.capture import Reconnecting, Say, announced_frames, as_bgr, is_camera, open_capture
-
-Image = NDArray[np.uint8]
 
 DEFAULT_FPS = 30.0  # of sources that do not tell
 DECODE_AHEAD = 4  # frames waiting in the queue: enough to hide decoding, little memory

@@ -8,10 +8,10 @@ from typing import cast
 import cv2
 import numpy as np
 
+from tracking import Image
 from tracking.features import detect_corners
 from tracking.flow import GUIDE_LEVELS, GUIDE_WINDOW_PX, GUIDES, WINDOW_PX, Grays, both_ways, spread_order
 from tracking.region import region_mask
-from tracking.video import Image
 
 
 def bare_loop(video: str, roi: tuple[int, int, int, int], points: int, frames: int) -> float:

@@ -1,10 +1,12 @@
-"""What Rerun reads from the environment when it is loaded; for the command, and for the processes that use Rerun."""
+"""What Rerun and OpenCV read from the environment when they are loaded; for the command and its processes."""
 
 import os
 
 ENVIRONMENT = {
     "RERUN_ANALYTICS": "0",
     "RUST_LOG": "off",  # what goes wrong is said by us, once, without a time stamp
+    "OPENCV_LOG_LEVEL": "SILENT",
+    "OPENCV_FFMPEG_LOGLEVEL": "-8",  # nothing, too
     "MIMALLOC_PURGE_DELAY": "0",  # its memory goes back to the system at once: a long run stays small
 }
 

@@ -18,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from app.recording.environment import environment as completed_environment
+
 ROOT = Path(__file__).parents[2]
 CASES, WORKERS = 300, 2
 SECONDS, BYTES = 120.0, 2 * 2**30
@@ -219,7 +221,7 @@ def fuzz(count: int) -> list[dict[str, object]]:
     with tempfile.TemporaryDirectory() as name:
         samples = Path(name)
         make_samples(samples)
-        environment = os.environ | {"RERUN_ANALYTICS": "0", "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+        environment = completed_environment() | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
         command = [sys.executable, "-m", "tests.robustness.fuzz", "--worker", str(samples)]
         workers = [
             subprocess.Popen([*command, str(k), str(count)], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)

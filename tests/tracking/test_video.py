@@ -1,6 +1,5 @@
-import re
-import subprocess
-import sys
+"""Frames with their times: files, ranges, ends."""
+
 import threading
 from pathlib import Path
 
@@ -26,13 +25,6 @@ def movie(tmp_path: Path) -> Path:
         writer.write(picture(i))
     writer.release()
     return path
-
-
-@pytest.fixture
-def images(tmp_path: Path) -> Path:
-    for i in range(7, 17):
-        cv2.imwrite(str(tmp_path / f"img{i:04d}.png"), picture(i))
-    return tmp_path / "img%04d.png"
 
 
 def frames(source: Path, first: int = 0, stop: int | None = None) -> list[Frame]:
@@ -62,43 +54,6 @@ def test_delivers_the_range_that_is_asked_for(movie: Path, first: int, stop: int
     assert found[0].time_s == pytest.approx(first / 25.0)
 
 
-def test_reads_numbered_images_that_start_anywhere(images: Path) -> None:
-    found = frames(images)
-    assert [int(f.image[0, 0, 0]) for f in found] == [8 * i for i in range(7, 17)]
-    assert [f.index for f in found] == list(range(10))
-    assert np.all(np.diff([f.time_s for f in found]) > 0)
-
-
-def test_goes_on_past_damaged_images(images: Path) -> None:
-    for i, data in ((9, b""), (10, b"no picture")):
-        (images.parent / f"img{i:04d}.png").write_bytes(data)
-    assert [f.index for f in frames(images)] == [0, 1, 4, 5, 6, 7, 8, 9]
-
-
-@pytest.mark.parametrize("kind", ["gray", "alpha", "deep"])
-def test_images_of_any_kind_become_bgr(tmp_path: Path, kind: str) -> None:
-    base = {
-        "gray": np.full((48, 64), 200, np.uint8),
-        "alpha": np.full((48, 64, 4), 200, np.uint8),
-        "deep": np.full((48, 64), 200 * 256, np.uint16),
-    }[kind]
-    cv2.imwrite(str(tmp_path / "i0.png"), base)
-    (frame,) = frames(tmp_path / "i%d.png")
-    assert frame.image.shape == (48, 64, 3)
-    assert frame.image.dtype == np.uint8
-    assert np.all(frame.image == 200)
-
-
-def test_a_frame_of_another_size_is_fitted(tmp_path: Path) -> None:
-    cv2.imwrite(str(tmp_path / "i0.png"), picture(3))
-    cv2.imwrite(str(tmp_path / "i1.png"), cv2.resize(picture(4), (128, 96)))
-    assert [f.image.shape for f in frames(tmp_path / "i%d.png")] == [(48, 64, 3)] * 2
-
-
-def test_a_single_image_is_a_video_of_one_frame(images: Path) -> None:
-    assert len(frames(images.parent / "img0007.png")) == 1
-
-
 @pytest.mark.parametrize("leave_after", [0, 1, 5])
 def test_leaving_early_ends_the_decoding_thread(movie: Path, leave_after: int) -> None:
     with Video(str(movie)) as video:
@@ -121,43 +76,6 @@ def test_an_error_while_iterating_ends_the_decoding_thread(movie: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "content", "says"),
-    [
-        ("missing.mp4", None, "no video file {}; check the path"),
-        ("text.mp4", b"this is not a video\n" * 9, "{} cannot be decoded"),
-        ("empty.mp4", b"", "{} cannot be decoded"),
-        ("img%04d.png", None, "no image file matches {}"),
-        ("nowhere/img%04d.png", None, "no image file matches {}"),
-    ],
-)
-def test_names_a_source_that_cannot_be_read(tmp_path: Path, name: str, content: bytes | None, says: str) -> None:
-    path = tmp_path / name
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(TrackingError, match=re.escape(says.format(path))) as error:
-        Video(str(path))
-    assert "\n" not in str(error.value)
-
-
-def test_av1_is_read_or_told_how_to_convert() -> None:
-    """The FFmpeg in OpenCV 5.0.0's wheel has no AV1 decoder, the one in 4.14.0's has."""
-    if cv2.VideoCapture(str(AV1)).read()[0]:
-        found = frames(AV1)
-        assert [f.index for f in found] == [0, 1]
-        assert abs(float(found[1].image.mean()) - 128) < 3
-    else:
-        with pytest.raises(TrackingError, match=r"av1\.mp4 is AV1 video.*ffmpeg -i .*av1\.mp4 -c:v libx264"):
-            Video(str(AV1))
-
-
-def test_a_folder_and_an_absent_camera(tmp_path: Path) -> None:
-    with pytest.raises(TrackingError, match="is a folder"):
-        Video(str(tmp_path))
-    with pytest.raises(TrackingError, match="camera 97 cannot be opened"):
-        Video("97")
-
-
-@pytest.mark.parametrize(
     ("first", "stop", "says"),
     [
         (20, None, "ends at frame 20"),
@@ -169,18 +87,6 @@ def test_a_folder_and_an_absent_camera(tmp_path: Path) -> None:
 def test_a_range_without_frames(movie: Path, first: int, stop: int | None, says: str) -> None:
     with pytest.raises(TrackingError, match=says):
         Video(str(movie), first, stop)
-
-
-def test_opencv_keeps_quiet(tmp_path: Path) -> None:
-    (tmp_path / "text.mp4").write_text("no video")
-    code = (
-        "import sys\nfrom tracking import TrackingError\nfrom tracking.video import Video\n"
-        "for source in sys.argv[1:]:\n"
-        "    try:\n        Video(source)\n    except TrackingError:\n        pass\n"
-    )
-    command = [sys.executable, "-c", code, str(AV1), str(tmp_path / "text.mp4"), "97"]
-    done = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, text=True, check=True)
-    assert done.stdout + done.stderr == ""
 
 
 def test_true_time_stamps_of_real_footage(shared_data: Path) -> None:

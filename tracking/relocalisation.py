@@ -1,27 +1,25 @@
-"""Where a surface is in a picture when nothing is known of where it was: features, matched to the reference frame."""
+"""Relocalisation: a surface found anywhere in a picture, by features matched to the reference frame."""
 
 from typing import cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
+from tracking import Array, Flags, Floats, Image, Indices
 
 SIDE_PX = 960  # larger pictures are halved for matching
 FEATURES = 1200  # most in the reference's surface
 PICTURE_FEATURES = 2500  # most in another picture, which shows more than the surface
 RATIO = 0.8  # of the distances to the best and the second best match (Lowe 2004)
-BENT = 0.08  # of the surface's extent: how far a bent surface may be off one affine map
-LOCAL = 0.03  # of the extent: how far a match may be off its neighbours'
-REACH = 0.12  # of the extent: how far a match tells where the surface is
-ROUNDS = 3  # of telling matches by their neighbours
+AFFINE_ERROR = 0.08  # of the surface's extent: how far a bent surface may be off one affine map
+LOCAL_ERROR = 0.03  # of the extent: how far a match may be off its neighbours'
+INFLUENCE = 0.12  # of the extent: standard deviation of the weight of a match around it
+ROUNDS = 3  # of rejecting matches by their neighbours
 MIN_MATCHES = 15  # fewer may agree by chance
 SCALES = (0.2, 5.0)  # between the smallest and the largest stretch of the affine map, against the reference
 
 
-class Relocation:
+class Relocalisation:
     """Finds the surface of a reference frame in any picture.
 
     Args:
@@ -50,7 +48,7 @@ class Relocation:
         index = np.array(pairs)
         there, here = self._places[index[:, 0]], places[index[:, 1]]
         cv2.setRNGSeed(0)  # the same video gives the same result
-        affine, agree = cv2.estimateAffine2D(there, here, ransacReprojThreshold=BENT * self._extent, maxIters=4000)
+        affine, agree = cv2.estimateAffine2D(there, here, ransacReprojThreshold=AFFINE_ERROR * self._extent, maxIters=4000)
         if affine is None or int(agree.sum()) < MIN_MATCHES:
             return None
         stretch = np.linalg.svd(affine[:, :2], compute_uv=False)
@@ -58,31 +56,29 @@ class Relocation:
             return None
         return self._bent(there, here, np.asarray(affine, np.float64), agree[:, 0] > 0)
 
-    def _bent(self, there: Array, here: Array, affine: Array, agree: NDArray[np.bool_]) -> Array | None:
+    def _bent(self, there: Array, here: Array, affine: Array, agree: Flags) -> Array | None:
         """The points under an affine map bent to the matches around each."""
         off = here - _mapped(affine, there)
         for _ in range(ROUNDS):
             local, weight = self._interpolated(there, there[agree], off[agree], leave_out=np.flatnonzero(agree))
             size = float(np.sqrt(abs(np.linalg.det(affine[:, :2])))) * self._extent
-            near = np.linalg.norm(off - local, axis=1) < LOCAL * size
-            agree = np.where(weight > 1.0, near, agree) & (np.linalg.norm(off, axis=1) < 2.0 * BENT * size)
+            near = np.linalg.norm(off - local, axis=1) < LOCAL_ERROR * size
+            agree = np.where(weight > 1.0, near, agree) & (np.linalg.norm(off, axis=1) < 2.0 * AFFINE_ERROR * size)
             if agree.sum() < MIN_MATCHES:
                 return None
         local, weight = self._interpolated(self._points, there[agree], off[agree])
         return np.where(weight[:, None] > 1e-3, _mapped(affine, self._points) + local, np.nan)
 
-    def _interpolated(
-        self, at: Array, there: Array, off: Array, leave_out: NDArray[np.int64] | None = None
-    ) -> tuple[Array, Array]:
-        """Weighted mean (n, 2) of `off` around places (n, 2), and the weights (n,); a match has no say on itself."""
+    def _interpolated(self, at: Array, there: Array, off: Array, leave_out: Indices | None = None) -> tuple[Array, Array]:
+        """Weighted mean (n, 2) of `off` around places (n, 2), and their weights (n,); `leave_out` not around themselves."""
         squared = ((at[:, None] - there[None]) ** 2).sum(axis=2)
-        w = np.exp(-0.5 * squared / (REACH * self._extent) ** 2)
+        w = np.exp(-0.5 * squared / (INFLUENCE * self._extent) ** 2)
         if leave_out is not None:
             w[leave_out, np.arange(len(leave_out))] = 0.0
         total = w.sum(axis=1)
         return w @ off / np.maximum(total, 1e-12)[:, None], total
 
-    def _features(self, image_bgr: Image, sift: cv2.SIFT, mask: Image | None) -> tuple[Array, NDArray[np.float32]]:
+    def _features(self, image_bgr: Image, sift: cv2.SIFT, mask: Image | None) -> tuple[Array, Floats]:
         gray = cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)
         scale = min(1.0, SIDE_PX / max(gray.shape))
         if scale < 1.0:
@@ -92,7 +88,7 @@ class Relocation:
         if described is None:
             return np.empty((0, 2)), np.empty((0, 128), np.float32)
         places = np.array([feature.pt for feature in found], np.float64)
-        return (places + 0.5) / scale - 0.5, cast(NDArray[np.float32], described)
+        return (places + 0.5) / scale - 0.5, cast(Floats, described)
 
 
 def _mapped(affine: Array, points: Array) -> Array:

@@ -1,0 +1,68 @@
+"""Sources that cannot be opened are named, and OpenCV is silent."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import pytest
+
+from tracking import TrackingError
+from tracking.video import Frame, Video
+
+AV1 = Path(__file__).with_name("data") / "av1.mp4"
+
+
+def frames(source: Path, first: int = 0, stop: int | None = None) -> list[Frame]:
+    with Video(str(source), first, stop) as video:
+        return list(video)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("missing.mp4", None, "no video file {}; check the path"),
+        ("text.mp4", b"this is not a video\n" * 9, "{} cannot be decoded"),
+        ("empty.mp4", b"", "{} cannot be decoded"),
+        ("img%04d.png", None, "no image file matches {}"),
+        ("nowhere/img%04d.png", None, "no image file matches {}"),
+    ],
+)
+def test_names_a_source_that_cannot_be_read(tmp_path: Path, name: str, content: bytes | None, says: str) -> None:
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(TrackingError, match=re.escape(says.format(path))) as error:
+        Video(str(path))
+    assert "\n" not in str(error.value)
+
+
+def test_av1_is_read_or_told_how_to_convert() -> None:
+    """The FFmpeg in OpenCV 5.0.0's wheel has no AV1 decoder, the one in 4.14.0's has."""
+    if cv2.VideoCapture(str(AV1)).read()[0]:
+        found = frames(AV1)
+        assert [f.index for f in found] == [0, 1]
+        assert abs(float(found[1].image.mean()) - 128) < 3
+    else:
+        with pytest.raises(TrackingError, match=r"av1\.mp4 is AV1 video.*ffmpeg -i .*av1\.mp4 -c:v libx264"):
+            Video(str(AV1))
+
+
+def test_a_folder_and_an_absent_camera(tmp_path: Path) -> None:
+    with pytest.raises(TrackingError, match="is a folder"):
+        Video(str(tmp_path))
+    with pytest.raises(TrackingError, match="camera 97 cannot be opened"):
+        Video("97")
+
+
+def test_opencv_keeps_quiet(tmp_path: Path) -> None:
+    (tmp_path / "text.mp4").write_text("no video")
+    code = (
+        "import sys\nfrom tracking import TrackingError\nfrom tracking.video import Video\n"
+        "for source in sys.argv[1:]:\n"
+        "    try:\n        Video(source)\n    except TrackingError:\n        pass\n"
+    )
+    command = [sys.executable, "-c", code, str(AV1), str(tmp_path / "text.mp4"), "97"]
+    done = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, text=True, check=True)
+    assert done.stdout + done.stderr == ""
