@@ -5,7 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from reconstruction.camera import Camera
 from tests.app.command_line import Command, in_process, still, turning, write_video
+from tests.app.exported import FRAMES as EXPORTED
+from tests.synthetic_run import Run, write_run
 from tests.tracking.scene import SIZE
 
 
@@ -36,3 +39,22 @@ def videos(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "text.mp4").write_text("This is not a video.\n" * 50)
     (folder / "empty.mp4").touch()
     return folder
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A recording."""
+    return write_run(tmp_path_factory.mktemp("export") / "sheet.rrd", frames=EXPORTED)
+
+
+@pytest.fixture(scope="session")
+def orthographic(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """One of an orthographic camera."""
+    camera = Camera(np.inf, np.array([80.0, 60.0]))
+    return write_run(tmp_path_factory.mktemp("export") / "far.rrd", frames=EXPORTED, camera=camera)
+
+
+@pytest.fixture(scope="session")
+def bootstrapping(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One that ended before there was a shape."""
+    return write_run(tmp_path_factory.mktemp("export") / "early.rrd", frames=3, first_shape=9).path

@@ -1,63 +1,25 @@
 """Exports: opened again by other libraries, and equal to what the run had."""
 
-import csv
 import json
 import shutil
-from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 import trimesh
-from numpy.typing import NDArray
 
 from app import demo
-from app.commands.export import FOLDERS, default_path, export, held, steady
+from app.commands.export import default_path, export, held, steady
 from app.options.export import Export
-from app.playback.overlay import enlarged
-from app.playback.playback import Playback
-from app.playback.tables import write_npz
-from app.recording.styles import PREDICTED_RGB, SEEN_RGB
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
-from reconstruction.camera import Camera
 from tests.app.command_line import Command
+from tests.app.exported import FRAMES, exported, relative
 from tests.app.glb_file import GlbFile, issues
 from tests.synthetic_run import SIZE, Run, write_run
 
-FRAMES = 6
 FORMATS = ("glb", "obj", "ply", "csv", "npz", "mp4", "webm")
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    return write_run(tmp_path_factory.mktemp("export") / "sheet.rrd", frames=FRAMES)
-
-
-@pytest.fixture(scope="module")
-def orthographic(tmp_path_factory: pytest.TempPathFactory) -> Run:
-    camera = Camera(np.inf, np.array([80.0, 60.0]))
-    return write_run(tmp_path_factory.mktemp("export") / "far.rrd", frames=FRAMES, camera=camera)
-
-
-@pytest.fixture(scope="module")
-def bootstrapping(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_run(tmp_path_factory.mktemp("export") / "early.rrd", frames=3, first_shape=9).path
-
-
-def exported(recording: Path, kind: str, folder: Path, **options: object) -> Path:
-    out = folder / (f"out_{kind}" if kind in FOLDERS else f"out.{kind}")
-    words = export(Export(recording, format=kind, out=out, **options), Progress())  # type: ignore[arg-type]
-    assert words["out"] == str(out)
-    assert words["frames_with_shape"] == FRAMES
-    assert not list(folder.glob("*.part*"))
-    return out
-
-
-def relative(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    return float(np.linalg.norm(a - b) / np.linalg.norm(b - b.mean(axis=0)))
 
 
 @pytest.mark.parametrize("which", ["run", "orthographic"])
@@ -89,118 +51,6 @@ def test_glb_texture_has_the_video_s_colors_at_the_vertices(tmp_path: Path, run:
     px, py = np.rint(run.pixels).astype(int).T
     inside = np.abs(run.pixels - [80, 60]).min(axis=1) > 6  # away from the border between two colors
     assert np.abs(image[y, x].astype(int) - run.picture[py, px])[inside].max() < 25
-
-
-@pytest.mark.parametrize("kind", ["obj", "ply"])
-@pytest.mark.parametrize("axes", ["camera", "y-up"])
-def test_mesh_sequences_open_in_trimesh(tmp_path: Path, run: Run, kind: str, axes: str) -> None:
-    folder = exported(run.path, kind, tmp_path, axes=axes)
-    files = sorted(folder.glob("frame_*"))
-    assert [file.name for file in files] == [f"frame_{k:06d}.{kind}" for k in range(FRAMES)]
-    for file, estimate in zip(files, run.estimates, strict=True):
-        mesh = trimesh.load_mesh(file, process=False, maintain_order=True)
-        vertices = np.asarray(mesh.vertices) * ([1, -1, -1] if axes == "y-up" else 1)
-        assert relative(vertices, estimate.shape.T) < 1e-5
-        assert np.array_equal(mesh.faces, run.mesh.faces)
-    image = np.asarray(mesh.visual.material.image.convert("RGB"))
-    left, right = mesh.visual.uv[:, 0].argmin(), mesh.visual.uv[:, 0].argmax()
-    assert run.pixels[left, 0] < run.pixels[right, 0]
-    for vertex in (0, len(run.pixels) - 1):  # one in the top row, one in the bottom row of the picture
-        u, v = mesh.visual.uv[vertex]
-        x, y = int(u * image.shape[1]), int((1 - v) * image.shape[0])
-        px, py = np.rint(run.pixels[vertex]).astype(int)
-        assert np.abs(image[y, x, ::-1].astype(int) - run.picture[py, px]).max() <= 2
-    assert "unit: pixels" in files[0].read_bytes()[:300].decode(errors="ignore")
-
-
-@pytest.mark.parametrize("which", ["run", "orthographic"])
-def test_npz_is_what_the_run_had(tmp_path: Path, which: str, request: pytest.FixtureRequest) -> None:
-    run: Run = request.getfixturevalue(which)
-    with np.load(exported(run.path, "npz", tmp_path)) as stored:
-        values = dict(stored)
-    for key, name in (("S", "shape"), ("R", "R"), ("s", "s"), ("t", "t"), ("Lambda", "Lambda"), ("visible", "visible")):
-        expected = np.stack([getattr(estimate, name) for estimate in run.estimates])
-        assert values[key] == pytest.approx(expected, rel=1e-9, abs=1e-6), key
-    assert np.array_equal(values["faces"], run.mesh.faces)
-    assert np.array_equal(values["frames"], np.arange(FRAMES))
-    assert np.array_equal(np.isfinite(values["W"][:, 0]), values["visible"])
-    projected = np.stack([e.projection_px.T for e in run.estimates])
-    assert values["projection"] == pytest.approx(projected, abs=1e-6)
-    if run.camera.perspective:  # seen from its place, in its axes, the object is where the camera has it
-        k = 2
-        turned = values["camera_R"][k].T @ (run.basis.deform(values["Lambda"][k]) - values["camera_position"][k][:, None])
-        assert turned == pytest.approx(run.estimates[k].shape, abs=1e-6)
-    else:
-        assert np.isnan(values["camera_position"]).all()
-
-
-def test_npz_has_empty_rows_where_the_surface_was_lost(run: Run) -> None:
-    playback = Playback.load(run.path)
-    s, quaternion, visible = playback.s.copy(), playback.quaternion.copy(), playback.visible.copy()
-    s[3], quaternion[3], visible[3] = np.nan, np.nan, False
-    phases = [*playback.phases[:3], "lost", *playback.phases[4:]]
-    file = BytesIO()
-    write_npz(replace(playback, s=s, quaternion=quaternion, visible=visible, phases=phases), file, lambda: None)
-    with np.load(BytesIO(file.getvalue())) as stored:
-        assert stored["frames"].tolist() == list(range(FRAMES))
-        for key in ("S", "R", "s", "projection", "camera_R", "camera_position"):
-            assert [bool(np.isnan(row).all()) for row in stored[key]] == [k == 3 for k in range(FRAMES)], key
-        assert not stored["visible"][3].any()
-
-
-def read(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def test_csv_has_points_poses_and_coefficients(tmp_path: Path, run: Run) -> None:
-    folder = exported(run.path, "csv", tmp_path)
-    points, p = read(folder / "points.csv"), len(run.pixels)
-    assert len(points) == FRAMES * p
-    for frame, point in ((1, 0), (1, 1), (4, 3)):
-        row = points[frame * p + point]
-        assert (int(row["frame"]), int(row["point"])) == (frame, point)
-        estimate, observation = run.estimates[frame], run.observations[frame]
-        assert bool(int(row["visible"])) == observation.visible[point]
-        assert (row["observed_x"] == "") == (not observation.visible[point])
-        assert float(row["projected_x"]) == pytest.approx(estimate.projection_px[point, 0], rel=1e-6)
-        xyz = [float(row[axis]) for axis in "xyz"]
-        assert xyz == pytest.approx(estimate.shape[:, point], rel=1e-6)
-    frames, coefficients = read(folder / "frames.csv"), read(folder / "lambda.csv")
-    assert [row["phase"] for row in frames] == ["bootstrap"] * 2 + ["tracking"] * 4
-    assert float(frames[3]["qw"]) == pytest.approx(run.estimates[3].quaternion[0])
-    center = -run.estimates[3].R.T @ [*run.estimates[3].t, run.camera.focal_px]
-    assert [float(frames[3][f"camera_{axis}"]) for axis in "xyz"] == pytest.approx(center, rel=1e-6, abs=1e-5)
-    assert float(coefficients[5]["tau_2"]) == pytest.approx(run.estimates[5].Lambda[2, 1])
-    assert len(read(folder / "mesh.csv")) == len(run.mesh.faces)
-
-
-@pytest.mark.parametrize("kind", ["mp4", "webm"])
-def test_videos_show_every_frame_with_its_points(tmp_path: Path, run: Run, kind: str) -> None:
-    video = cv2.VideoCapture(str(exported(run.path, kind, tmp_path)))
-    assert video.get(cv2.CAP_PROP_FPS) == pytest.approx(30, abs=0.01)
-    pictures = []
-    while (frame := video.read())[0]:
-        pictures.append(frame[1])
-    assert len(pictures) == FRAMES
-    assert pictures[0].shape[1::-1] == enlarged(SIZE)
-    scale = enlarged(SIZE)[0] / SIZE[0]
-    observation, estimate = run.observations[1], run.estimates[1]
-
-    def near(places_px: NDArray[np.float64], color: tuple[int, int, int]) -> float:
-        x, y = np.rint((places_px + 0.5) * scale - 0.5).astype(int).T
-        return float(np.mean(np.abs(pictures[1][y, x].astype(int) - color[::-1]).max(axis=1) < 70))
-
-    seen = observation.visible
-    assert near(observation.points_px[seen], SEEN_RGB) > 0.9
-    assert near(estimate.projection_px[~seen], PREDICTED_RGB) > 0.9
-    assert near(observation.points_px[seen], PREDICTED_RGB) < 0.1
-
-
-def test_an_overlay_is_still_the_frame_away_from_the_mesh(tmp_path: Path, run: Run) -> None:
-    video = cv2.VideoCapture(str(exported(run.path, "mp4", tmp_path)))
-    image = video.read()[1]
-    assert np.abs(image[: image.shape[0] // 10].astype(int) - run.picture[0, 0]).max() < 12
 
 
 @pytest.mark.parametrize(
