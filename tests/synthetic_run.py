@@ -80,7 +80,7 @@ def write_run(path: Path, *, frames: int = 6, first_shape: int = 2, camera: Came
             phase = "tracking" if index >= first_shape else "bootstrap"
             recording.observe(Frame(index, time_s, image), observations[index], phase=phase)
             if index == first_shape:
-                recording.rest(basis, mesh.faces, mesh.edges, camera, texture_bgr=image, texture_px=pixels)
+                recording.rest(basis, mesh, camera, image, pixels)
                 recording.event(index, time_s, "rest shape: plane")
             for known in range(first_shape + 1) if index == first_shape else (index,):
                 if index >= first_shape:

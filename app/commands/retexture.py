@@ -8,8 +8,8 @@ from typing import Self, cast
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array, Image
 from app.commands.export import steady
 from app.files.video_out import PacedVideo, VideoSink, check_video_format
 from app.files.writing import check_free
@@ -26,9 +26,6 @@ from reconstruction.basis.model import Model
 from reconstruction.estimate import ShapeEstimate
 from tracking.klt import Observation
 from tracking.video import Frame
-
-Array = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 RRD_MAGIC = b"RRF"
 STILL_PX = 1.0

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tracking.klt import Observation
+from tracking.guarded import Change, Guarded
 
 
 @dataclass
@@ -25,11 +25,13 @@ class Counts:
     _share: float = 0.0
     _share_sum: float = 0.0
 
-    def add(self, observation: Observation, *, lost: bool) -> None:
-        """Count a frame."""
+    def add(self, guarded: Guarded, *, lost: bool) -> None:
+        """Count a frame, what was seen in it, and whether it is one without the surface."""
         self.frames += 1
         self.frames_lost += lost
-        self._share = float(observation.visible.mean())
+        self.losses += guarded.change is Change.LOST
+        self.recoveries += guarded.change is Change.RECOVERED
+        self._share = float(guarded.observation.visible.mean())
         self._share_sum += self._share
 
     @property

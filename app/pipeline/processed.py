@@ -4,9 +4,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from app.arrays import Array, Image
 from reconstruction.basis.model import Model
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
@@ -23,12 +21,19 @@ class Surface:
         points_px: (P, 2) its vertices in that frame.
         model: rest shape, mesh, modes and camera.
         metric: the dissimilarity its modes come from.
+        texture_bgr: (H, W, 3) the first frame, with a texture painted on it if one was asked for.
     """
 
     first: Frame
-    points_px: NDArray[np.float64]
+    points_px: Array
     model: Model
     metric: Metric
+    texture_bgr: Image
+
+    @property
+    def recorded(self) -> tuple[object, ...]:
+        """What `Recording.rest` takes."""
+        return self.model.basis, self.model.mesh, self.model.camera, self.texture_bgr, self.points_px
 
 
 @dataclass(frozen=True, eq=False)

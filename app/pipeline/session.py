@@ -2,20 +2,15 @@
 
 from collections import deque
 from collections.abc import Generator, Iterator
-from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from time import perf_counter
 from typing import Literal
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from app.files.names import RECORDINGS, beside, free_name
 from app.files.writing import check_free
-from app.options.run import Run, as_words
-from app.painting.compositing import Placement, painted
-from app.painting.picture import first_picture
+from app.options.run import Run
 from app.pipeline.counts import Counts
 from app.pipeline.interrupts import completed
 from app.pipeline.prefetch import Prefetch
@@ -30,8 +25,6 @@ from app.terminal.progress import Progress
 from reconstruction import ReconstructionError
 from tracking.guarded import Change, Guarded
 from tracking.video import Frame, Video
-
-NO_PICTURE = np.empty((0, 0, 3), np.uint8)
 
 
 class Session:
@@ -55,7 +48,6 @@ class Session:
 
     def __init__(self, config: Run, progress: Progress, *, record: bool = True) -> None:
         self._config, self._progress, self._record_unnamed = config, progress, record
-        self._picture = first_picture(config.texture) if config.texture else None
         for path in (config.output.out, config.output.tracks_out, config.output.shapes_out):
             check_free(path, overwrite=config.output.overwrite)
         self._watch, self._counts, self._order = Stopwatch(), Counts(), InOrder()
@@ -63,8 +55,7 @@ class Session:
         self._surface: Surface | None = None
         self._successor: Successor | None = None
         self._paths: list[Path | None] = []
-        self.fps = self._elapsed_s = 0.0
-        self.interrupted = False
+        self.fps, self.interrupted = 0.0, False
 
     def run(self) -> RunSummary:
         """Process the whole source; an interrupt ends it early, with everything so far kept.
@@ -95,19 +86,15 @@ class Session:
                 raise UsageError(
                     f"{config.source} gives only one frame: a shape shows in how it moves; give a video, or more --frames"
                 )
-            self.fps, self._size = video.fps, video.size
+            self.fps = video.fps
             self._object = self._first_object = TrackedObject(config, first, self._watch)
-            self._path = output.out
-            if self._path is None and self._record_unnamed:
-                self._path = free_name(RECORDINGS, config.source)
+            self._path = output.out or (free_name(RECORDINGS, config.source) if self._record_unnamed else None)
             needed = bool(self._path or output.connect or output.view)
-            with (
-                RecordingProcess(needed=needed) as self._recording,
-                self._progress,
-                Prefetch(chain([second], source)) as self._prefetch,
-            ):
-                self._started_s = perf_counter()
+            prefetch = Prefetch(chain([second], source))
+            with RecordingProcess(needed=needed) as self._recording, self._progress, prefetch as self._prefetch:
+                self._watch.start()
                 self._progress.expect(video.frame_count)
+                self._open_recording(first)
                 yield from self._objects(first)
 
     def _told(self, text: str) -> None:
@@ -115,10 +102,8 @@ class Session:
         self._progress.say(text)
         self._messages.append(text)
 
-    def _objects(self, first: Frame) -> Iterator[Processed]:
-        """One object after another."""
-        self._open_recording(first)
-        frame: Frame | None = first
+    def _objects(self, frame: Frame | None) -> Iterator[Processed]:
+        """One object after another, from this frame on."""
         while frame is not None:
             try:
                 frame = yield from self._follow(frame)
@@ -160,18 +145,16 @@ class Session:
         if guarded.change is Change.NONE:
             return
         if guarded.change is Change.LOST:
-            self._counts.losses += 1
             config = options_for_another(self._config, self._counts.objects + 1)
             self._successor = Successor(config, frame, self._watch, cut=guarded.cut)
         else:
-            self._counts.recoveries += 1
             self._successor = None
         self._note(frame.index, frame.time_s, f"{guarded.change.value} at frame {frame.index}: {guarded.reason}", "WARN")
 
     def _reconstruct(self, frame: Frame, guarded: Guarded) -> None:
         """Make shapes of a frame's points, and record what is known."""
         tracked, observation = self._object, guarded.observation
-        self._counts.add(observation, lost=tracked.lost)
+        self._counts.add(guarded, lost=tracked.lost)
         self._order.add(frame, observation)
         if tracked.lost and self._surface:
             self._order.end(self._surface)
@@ -181,8 +164,7 @@ class Session:
             self._successor.look(frame)
         with self._watch.time("record"):
             self._split_recording(frame)
-            shown = frame if tracked.config.output.image == "jpeg" else replace(frame, image=NO_PICTURE)
-            self._recording.tell("observe", shown, observation, phase=phase.value)
+            self._recording.tell("observe", tracked.recorded(frame), observation, phase=phase.value)
             self._record(shapes)
         self._recording.tell("timing", frame.index, frame.time_s, dict(self._watch.now))
         self._watch.now.clear()
@@ -204,22 +186,7 @@ class Session:
         self._surface = self._object.surface
         for note in self._object.notes:
             self._note(index, time_s, note)
-        self._record_model(self._surface)
-
-    def _record_model(self, surface: Surface) -> None:
-        model, picture = surface.model, surface.first.image
-        if self._picture is not None and self._object.config.texture:
-            placement = Placement(self._config.place, self._config.opacity)
-            picture = painted(picture, surface.points_px, model, self._picture, placement)
-        self._recording.tell(
-            "rest",
-            model.basis,
-            model.mesh.faces,
-            model.mesh.edges,
-            model.camera,
-            texture_bgr=picture,
-            texture_px=surface.points_px,
-        )
+        self._recording.tell("rest", *self._surface.recorded)
 
     def _end_object(self, *, last: bool) -> None:
         """Record the shapes that are left and the summary, and save the files asked for.
@@ -228,17 +195,14 @@ class Session:
             ReconstructionError: the last object has too few frames for a rest shape; if interrupted, it is only told.
         """
         try:
-            shapes = self._object.finish()
+            self._record(self._object.finish())
         except ReconstructionError as error:
             if last and not self.interrupted:
                 raise
             self._progress.say(in_a_line(error))
-            shapes = []
-        with self._watch.time("record"):
-            self._record(shapes)
         if last:
             self._order.end(self._surface)
-            self._elapsed_s = perf_counter() - self._started_s
+            self._watch.stop()
             self.summary = self._summary(self._first_object)
         self._recording.tell("summary", self._summary(self._object).as_dict())
         if self._surface is not None:  # its figure would have slowed the run
@@ -249,10 +213,7 @@ class Session:
         """From this frame on the successor is followed, in a recording of its own."""
         assert self._successor is not None
         assert self._successor.found is not None
-        text = (
-            f"another object from frame {frame.index} on: followed since frame {self._successor.found.first.index}, "
-            f"nothing seen of the one before since frame {self._successor.lost.index}"
-        )
+        text = f"another object from frame {frame.index} on: {self._successor.history}"
         self._note(frame.index, frame.time_s, text, "WARN")  # where one ends and
         self._object, self._successor, self._surface = self._successor.found, None, None
         self._counts.objects += 1
@@ -262,23 +223,12 @@ class Session:
 
     def _open_recording(self, frame: Frame) -> None:
         """Write another recording from a frame on: the first, of another object, or the next part of a long one."""
-        config, output = self._object.config, self._object.config.output
         self._opened_s = frame.time_s
         path, part = self._path, len(self._paths) + 1
         if path is not None and part > 1:
-            path = beside(path, f"part{part}", overwrite=output.overwrite)
+            path = beside(path, f"part{part}", overwrite=self._config.output.overwrite)
         self._paths.append(path)
-        self._recording.tell(
-            "open",
-            path,
-            configuration=as_words(config),
-            size=self._size,
-            connect=output.connect,
-            view=output.view,
-            image=output.image,
-            video=Path(config.source),
-            overwrite=output.overwrite,
-        )
+        self._recording.tell("open", path, **self._object.recording_options)
 
     def _split_recording(self, frame: Frame) -> None:
         """Go on in another file, if it is time."""
@@ -286,7 +236,7 @@ class Session:
         if minutes and self._surface and frame.time_s - self._opened_s >= 60.0 * minutes:
             self._recording.tell("summary", self._summary(self._object).as_dict())
             self._open_recording(frame)
-            self._record_model(self._surface)
+            self._recording.tell("rest", *self._surface.recorded)
 
     def _note(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:
         """Tell the person, and record it."""
@@ -295,13 +245,4 @@ class Session:
 
     def _summary(self, tracked: TrackedObject) -> RunSummary:
         """What is known of the whole run, and of one object."""
-        elapsed_s = self._elapsed_s or perf_counter() - self._started_s
-        return summary_of(
-            self._config.source,
-            tracked,
-            self._counts,
-            self._watch,
-            elapsed_s=elapsed_s,
-            interrupted=self.interrupted,
-            recordings=self._paths,
-        )
+        return summary_of(tracked, self._counts, self._watch, self._paths, interrupted=self.interrupted)

@@ -10,10 +10,26 @@ STAGES = ("decode", "track", "reconstruct", "record")
 
 @dataclass
 class Stopwatch:
-    """Milliseconds per stage: of the current frame, and summed."""
+    """Milliseconds per stage: of the current frame, and summed; and seconds of the whole."""
 
     now: dict[str, float] = field(default_factory=dict)
     total: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
+
+    _started_s: float = 0.0
+    _elapsed_s: float | None = None
+
+    def start(self) -> None:
+        """The whole begins."""
+        self._started_s = perf_counter()
+
+    def stop(self) -> None:
+        """The whole is over."""
+        self._elapsed_s = self.elapsed_s
+
+    @property
+    def elapsed_s(self) -> float:
+        """Seconds from start to stop, or until now."""
+        return perf_counter() - self._started_s if self._elapsed_s is None else self._elapsed_s
 
     @contextmanager
     def time(self, stage: str) -> Iterator[None]:

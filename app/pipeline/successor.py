@@ -45,6 +45,14 @@ class Successor:
         self._tried: TrackedObject | None = None
         self._moves = False
 
+    @property
+    def history(self) -> str:
+        """How it came about, in words."""
+        assert self.found is not None
+        return (
+            f"followed since frame {self.found.first.index}, nothing seen of the one before since frame {self.lost.index}"
+        )
+
     def look(self, frame: Frame) -> None:
         """See what is in the next frame; what cannot be followed, or gives no model, is given up, and tried again later."""
         if self._tried is None and frame.time_s < self._due_s:

@@ -84,21 +84,14 @@ class RunSummary:
 
 
 def summary_of(
-    source: str,
-    tracked: TrackedObject,
-    counts: Counts,
-    watch: Stopwatch,
-    *,
-    elapsed_s: float,
-    interrupted: bool,
-    recordings: Sequence[Path | None],
+    tracked: TrackedObject, counts: Counts, watch: Stopwatch, recordings: Sequence[Path | None], *, interrupted: bool
 ) -> RunSummary:
-    """The summary of a run that took so long, and of one of its objects."""
+    """The summary of a run and of one of its objects."""
     reconstruction, collected = tracked.reconstruction, tracked.collected
     rest, camera = reconstruction.rest, reconstruction.camera
     several = recordings[0] is not None and len(recordings) > 1
     return RunSummary(
-        source=source,
+        source=tracked.config.source,
         frames=counts.frames,
         interrupted=interrupted,
         points=len(tracked.points_px),
@@ -119,7 +112,7 @@ def summary_of(
         losses=counts.losses,
         recoveries=counts.recoveries,
         frames_lost=counts.frames_lost,
-        fps=counts.frames / elapsed_s,
+        fps=counts.frames / watch.elapsed_s,
         stage_ms={stage: total / max(counts.frames, 1) for stage, total in watch.total.items()},
         recording=recordings[0],
         parts=len(recordings) if several else None,

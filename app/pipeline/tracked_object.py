@@ -1,10 +1,13 @@
 """One object of a run: its points, who follows them, who makes shapes of them, and what is kept of it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
-from app.options.run import Run
+from app.options.run import Run, as_words
+from app.painting.compositing import Placement, painted
+from app.painting.picture import first_picture
 from app.pipeline.estimates import Collected, save_shapes
 from app.pipeline.prepare import prepared
 from app.pipeline.processed import Surface
@@ -16,6 +19,8 @@ from tracking.guarded import Change, Guarded, GuardedTracker
 from tracking.klt import Observation
 from tracking.tracks import Tracks, Truth
 from tracking.video import Frame
+
+NO_PICTURE = np.empty((0, 0, 3), np.uint8)
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,7 @@ class TrackedObject:
         self._truth = Truth.load(config.ground_truth) if config.ground_truth else None
         truth_frames = frozenset(self._truth.frames.tolist()) if self._truth else frozenset()
         self.collected = Collected(config.output.shapes_out is not None, truth_frames)
+        self._texture = first_picture(config.texture) if config.texture else None
         self.points_px, self.reconstruction = prepared(config, first)
         self._tracker = GuardedTracker(first.image, self.points_px)
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
@@ -76,7 +82,29 @@ class TrackedObject:
         """What its shapes are of; there once the bootstrap is over."""
         metric = self.reconstruction.metric
         assert metric is not None
-        return Surface(self.first, self.points_px, self.reconstruction.model, metric)
+        model, seen = self.reconstruction.model, self.first.image
+        if self._texture is not None:
+            placement = Placement(self.config.place, self.config.opacity)
+            seen = painted(seen, self.points_px, model, self._texture, placement)
+        return Surface(self.first, self.points_px, model, metric, seen)
+
+    @property
+    def recording_options(self) -> dict[str, object]:
+        """What a `Recording` of it takes beside the path."""
+        output, (height, width) = self.config.output, self.first.image.shape[:2]
+        return {
+            "configuration": as_words(self.config),
+            "size": (width, height),
+            "connect": output.connect,
+            "view": output.view,
+            "image": output.image,
+            "video": Path(self.config.source),
+            "overwrite": output.overwrite,
+        }
+
+    def recorded(self, frame: Frame) -> Frame:
+        """What its recording needs of a frame: the picture is left out if it is not stored."""
+        return frame if self.config.output.image == "jpeg" else replace(frame, image=NO_PICTURE)
 
     def prepare(self, frame: Frame) -> None:
         """Do what can be done early with the next frame, in another thread."""

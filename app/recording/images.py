@@ -6,11 +6,9 @@ from typing import Literal
 import cv2
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from app.arrays import Array, Image, Indices
 from app.terminal.errors import UsageError
-
-Image = NDArray[np.uint8]
 
 JPEG_QUALITY = 85
 
@@ -21,7 +19,7 @@ def jpeg(image: Image) -> rr.EncodedImage:
     return rr.EncodedImage(contents=encoded.tobytes(), media_type="image/jpeg")
 
 
-def embedded_video(video: Path | None) -> tuple[rr.AssetVideo, NDArray[np.int64]]:
+def embedded_video(video: Path | None) -> tuple[rr.AssetVideo, Indices]:
     """A video file as it is, and its frames' time stamps (F,) in nanoseconds.
 
     Raises:
@@ -36,7 +34,7 @@ def embedded_video(video: Path | None) -> tuple[rr.AssetVideo, NDArray[np.int64]
         raise UsageError(f"--image video cannot store {video} ({error}): use --image jpeg") from error
 
 
-def cropped(image: Image, points_px: NDArray[np.float64]) -> tuple[Image, NDArray[np.int64]]:
+def cropped(image: Image, points_px: Array) -> tuple[Image, Indices]:
     """The part of an image (H, W, 3) that points (p, 2) cover, 2 px wider, and its origin (2,) there."""
     size = np.array(image.shape[1::-1])
     low = np.clip(np.floor(points_px.min(axis=0)).astype(np.int64) - 2, 0, size - 1)
@@ -44,7 +42,7 @@ def cropped(image: Image, points_px: NDArray[np.float64]) -> tuple[Image, NDArra
     return image[low[1] : high[1], low[0] : high[0]], low
 
 
-def texture(crop: Image, points_px: NDArray[np.float64], faces: NDArray[np.int64]) -> rr.Mesh3D:
+def texture(crop: Image, points_px: Array, faces: Indices) -> rr.Mesh3D:
     """Triangles (m, 3) and their texture, of an image (h, w, 3) BGR and the vertices' pixels (p, 2) in it."""
     height, width = crop.shape[:2]
     model: Literal["RGB"] = "RGB"

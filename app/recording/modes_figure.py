@@ -10,15 +10,12 @@ from matplotlib.collections import TriMesh
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
-from numpy.typing import NDArray
 
+from app.arrays import Array, Indices
 from reconstruction.basis.distances import dissimilarity
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.modes import ModalBasis, doubly_centred, exact_points
 from reconstruction.settings import Metric
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 COLUMNS = 5
 DPI, SMALL_DPI = 150, 100

@@ -14,6 +14,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from app.arrays import Array, Image, Indices
 from app.recording import entities
 from app.recording.images import cropped, embedded_video, jpeg, texture
 from app.recording.stream import Stream, check_writable
@@ -28,9 +29,6 @@ from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
 from tracking.klt import Observation
 from tracking.video import Frame
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 FLUSH_FRAMES = 100  # a full disk is noticed, and a killed run keeps its past, to within so many frames
 NOWHERE = np.empty((0, 2))
@@ -66,8 +64,7 @@ class Recording:
         overwrite: bool = False,
     ) -> None:
         self.path = path
-        self._size = size
-        self._image = image
+        self._size, self._image = size, image
         self._video_ns: Indices = np.empty(0, np.int64)
         self._frames = 0
         self._last_seen: Array = NOWHERE
@@ -120,20 +117,11 @@ class Recording:
         if self._frames % FLUSH_FRAMES == 0:
             self._stream.flush()
 
-    def rest(
-        self,
-        basis: ModalBasis,
-        faces: Indices,
-        edges: Indices,
-        camera: Camera,
-        *,
-        texture_bgr: NDArray[np.uint8],
-        texture_px: Array,
-    ) -> None:
+    def rest(self, basis: ModalBasis, mesh: Mesh, camera: Camera, texture_bgr: Image, texture_px: Array) -> None:
         """The model, once it is known; `texture_px` (p, 2) are its vertices' pixels in `texture_bgr`."""
         if not self._stream.open:
             return
-        self._strips = edge_strips(edges)
+        self._strips = edge_strips(mesh.edges)
         crop, origin = cropped(texture_bgr, texture_px)
         self._stream.values(
             entities.MODEL,
@@ -143,8 +131,8 @@ class Recording:
             Upsilon=basis.Upsilon.ravel(),
             eigenvalues=basis.eigenvalues,
             Phi=basis.Phi.ravel(),
-            faces=faces.ravel(),
-            edges=edges.ravel(),
+            faces=mesh.faces.ravel(),
+            edges=mesh.edges.ravel(),
             strips=np.concatenate([np.append(strip, -1) for strip in self._strips]),
             texture_px=texture_px.ravel(),
             texture_origin=origin,
@@ -153,7 +141,7 @@ class Recording:
             focal_px=camera.focal_px,
             center_px=camera.center_px,
         )
-        self._stream.log(entities.MESH, texture(crop, texture_px - origin, faces), static=True)
+        self._stream.log(entities.MESH, texture(crop, texture_px - origin, mesh.faces), static=True)
         self._camera = camera
         self._stream.static(coefficient_styles(len(basis.eigenvalues)))
 
@@ -228,9 +216,7 @@ class Recording:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         try:
             self.leave(failed=isinstance(error, Exception))
         except UsageError:

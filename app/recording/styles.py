@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from app.arrays import Array
 from app.recording import entities
 from app.recording.stream import Loggable
 from reconstruction.camera import Camera
@@ -55,7 +55,7 @@ def coefficient_styles(modes: int) -> Iterator[tuple[str, Loggable]]:
     yield entities.SPECTRUM, [abscissa, color]
 
 
-def placement(vertices: NDArray[np.float64], camera: Camera, size: tuple[int, int]) -> Iterator[tuple[str, Loggable]]:
+def placement(vertices: Array, camera: Camera, size: tuple[int, int]) -> Iterator[tuple[str, Loggable]]:
     """Gives the first shape (p, 3) unit size at the origin, where the blueprint's eye looks."""
     center = vertices.mean(axis=0)
     scale = 1.0 / max(float(np.sqrt(np.mean(np.sum((vertices - center) ** 2, axis=1)))), 1e-9)

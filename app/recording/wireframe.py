@@ -5,9 +5,8 @@ from collections import defaultdict
 import numpy as np
 import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
-from numpy.typing import NDArray
 
-Indices = NDArray[np.int64]
+from app.arrays import Floats, Indices
 
 STRIP = rr.components.LineStrip2DBatch([]).as_arrow_array().type
 
@@ -37,7 +36,7 @@ def edge_strips(edges: Indices) -> list[Indices]:
     return open_strips + closed_strips
 
 
-def line_strips(points_px: NDArray[np.float32], strips: list[Indices]) -> rr.LineStrips2D:
+def line_strips(points_px: Floats, strips: list[Indices]) -> rr.LineStrips2D:
     """Strips through points (p, 2)."""
     order = np.concatenate(strips)
     # Rerun would convert strip by strip, which takes milliseconds.

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.files.names import free_name
 from app.options.model import Model
 from app.options.run import Output, Run
 from app.pipeline.session import Session
@@ -104,23 +103,6 @@ def test_existing_files_are_noticed_before_the_work(videos: Path) -> None:
     with pytest.raises(UsageError, match=r"shapes\.npz exists"):
         Session(config(videos, shapes_out=Path("shapes.npz")), Progress())
     assert Path("shapes.npz").read_text() == "somebody's work"
-
-
-@pytest.mark.parametrize(
-    ("source", "name"),
-    [
-        ("paper.mp4", "paper"),
-        ("/a/b/paper.mov", "paper"),
-        ("0", "camera0"),
-        ("frames/img%04d.png", "img04d"),
-        ("http://host/clip.mp4?x=1", "clip"),
-    ],
-)
-def test_recordings_are_named_after_their_source(source: str, name: str, here: Path) -> None:
-    assert free_name(here, source) == here / f"{name}.rrd"
-    (here / f"{name}.rrd").touch()
-    (here / f"{name}-2.rrd").touch()
-    assert free_name(here, source) == here / f"{name}-3.rrd"
 
 
 def test_priors_are_recorded_as_they_were_asked_for_and_as_they_were(videos: Path) -> None:

@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 
 from app.commands.retexture import retexture
-from app.files.names import beside
 from app.options.model import Model
 from app.options.retexture import Retexture
 from app.options.run import Output, Run
@@ -164,14 +163,6 @@ def test_an_object_lost_before_it_has_a_model_settles_for_what_there_was(tmp_pat
     assert (words["objects"], words["bootstrap_frames"]) == (2, 8)
     assert Playback.load(Path("run.rrd")).shaped.sum() == 8
     assert Playback.load(Path("run-part2.rrd")).shaped.all()
-
-
-def test_parts_of_an_earlier_run_are_kept_or_replaced(here: Path) -> None:
-    first, second = here / "run.rrd", here / "run-part2.rrd"
-    assert beside(first, "part2", overwrite=False) == second
-    second.touch()
-    assert beside(first, "part2", overwrite=False) == here / "run-part2-2.rrd"
-    assert beside(first, "part2", overwrite=True) == second
 
 
 def test_frames_of_both_are_given_in_order(two_scenes: Path) -> None:

@@ -101,9 +101,7 @@ def test_of_a_frame_that_is_estimated_again_the_last_counts(tmp_path: Path) -> N
     with Recording(path, configuration={}, size=SIZE) as recording:
         for index in range(3):
             recording.observe(Frame(index, index / 30, run.picture), run.observations[0], phase="tracking")
-        recording.rest(
-            run.basis, run.mesh.faces, run.mesh.edges, run.camera, texture_bgr=run.picture, texture_px=run.pixels
-        )
+        recording.rest(run.basis, run.mesh, run.camera, run.picture, run.pixels)
         for index in (2, 1, 1, 2, 1):  # out of order, too
             recording.estimate(index, index / 30, run.estimates[index])
         corrected = replace(run.estimates[1], s=0.5, Lambda=run.estimates[1].Lambda + 1)

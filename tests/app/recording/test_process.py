@@ -33,7 +33,7 @@ def tell(recording: RecordingProcess, run: Run, begin: int = 0) -> None:
     for index, (observation, estimate) in enumerate(zip(run.observations, run.estimates, strict=True), begin):
         recording.tell("observe", Frame(index, index / 30, image), observation, phase="tracking")
         if index == begin:
-            recording.tell("rest", run.basis, mesh.faces, mesh.edges, run.camera, texture_bgr=image, texture_px=run.pixels)
+            recording.tell("rest", run.basis, mesh, run.camera, image, run.pixels)
         recording.tell("estimate", index, index / 30, estimate)
         recording.tell("timing", index, index / 30, {"track": 1.0})
 

@@ -156,9 +156,7 @@ def test_a_lost_surface_leaves_no_mesh_on_the_picture(tmp_path: Path) -> None:
     path = tmp_path / "lost.rrd"
     run = write_run(path, frames=3, first_shape=0)
     with record(path, overwrite=True) as recording:
-        recording.rest(
-            run.basis, run.mesh.faces, run.mesh.edges, run.camera, texture_bgr=run.picture, texture_px=run.pixels
-        )
+        recording.rest(run.basis, run.mesh, run.camera, run.picture, run.pixels)
         recording.observe(Frame(0, 0.0, run.picture), run.observations[0], phase="tracking")
         recording.estimate(0, 0.0, run.estimates[0])
         nothing = Observation(np.full_like(run.pixels, np.nan), np.zeros(len(run.pixels), bool))
@@ -209,9 +207,7 @@ def fail(path: Path, error: type[BaseException], run: Run | None = None) -> None
     with record(path) as recording:
         recording.observe(*frame(), phase="tracking")
         if run:
-            recording.rest(
-                run.basis, run.mesh.faces, run.mesh.edges, run.camera, texture_bgr=picture(), texture_px=run.pixels
-            )
+            recording.rest(run.basis, run.mesh, run.camera, picture(), run.pixels)
             recording.estimate(0, 0.0, run.estimates[0])
         raise error
 
