@@ -10,6 +10,7 @@ from scipy.linalg import eigh, subspace_angles
 from threadpoolctl import threadpool_limits
 
 from app.bench.own_process import apart
+from app.bench.timing import Say
 from app.rivals.modal_analysis import vibration_modes
 from app.rivals.problems import MODES, surface_with_mesh
 from reconstruction.basis import distances, landmarks
@@ -24,7 +25,6 @@ COMPARED_POINTS, COMPARED_MODES = 3_024, 10  # where the exact subspace is at ha
 REPEATS = 5  # of what takes less than ...
 SHORT_S = 0.5
 
-Say = Callable[[str], None]
 T = TypeVar("T")
 
 

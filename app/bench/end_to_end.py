@@ -4,7 +4,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,6 +13,7 @@ from time import perf_counter, time
 import numpy as np
 
 from app.bench.own_process import apart
+from app.bench.timing import Say
 
 ROOT = Path(__file__).parents[2]
 KINECT = ROOT.parent / "shared" / "data" / "kinect_paper.mp4"  # research data, not part of the program
@@ -22,8 +23,6 @@ MANY_POINTS, MANY_FRAMES = 28_887, 12
 HELP = (sys.executable, "-m", "modeshape", "--help")
 HELP_REPEATS = 5
 QUICK_FRAMES = 120
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)

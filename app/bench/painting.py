@@ -1,12 +1,10 @@
 """Part 6: painting a picture on the mesh, in a frame of 640×480."""
 
-from collections.abc import Callable
-
 import cv2
 import numpy as np
 
 from app.arrays import Image
-from app.bench.timing import least_s
+from app.bench.timing import Say, least_s
 from app.painting.compositing import Compositor
 from app.painting.picture import premultiplied
 from reconstruction.basis.mesh import triangulate
@@ -18,7 +16,7 @@ PICTURE = (900, 1200, 3)
 BUDGET_S = 1.5
 
 
-def paint_ms(say: Callable[[str], None]) -> float:
+def paint_ms(say: Say) -> float:
     """Milliseconds of one core for a frame: colours, light and occlusion mask."""
     say("painting a picture")
     rng = np.random.default_rng(0)

@@ -6,6 +6,8 @@ from time import perf_counter, process_time
 
 MOST_REPEATS = 30
 
+Say = Callable[[str], None]
+
 
 def least_s(*jobs: Callable[[], object], budget_s: float = 0.3) -> list[float]:
     """Least processor seconds that each job took, run in turn until the budget is spent: 2 to 30 times."""

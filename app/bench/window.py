@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.bench.timing import growth, least_s
+from app.bench.timing import Say, growth, least_s
 from app.rivals.problems import WindowStep, full_model, summed, window_step
 from app.terminal.errors import UsageError
 from reconstruction.window.marginal import Previous
@@ -22,8 +22,6 @@ IN_A_ROW = 5  # of our few milliseconds, of which the first would find the cache
 ITERATIONS = 4  # timed together
 SAME_COST = 1e-6  # relative: who ends so near the least energy is timed
 LADDER = tuple(10.0**-k for k in range(3, 13))  # tolerances, loosest first: everyone may stop as early as that allows
-
-Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app import demo
 from app.commands.retexture import first_frame, is_recording, retexture
 from app.files.video_out import PacedVideo, VideoSink
 from app.options.retexture import Retexture
@@ -20,34 +19,13 @@ from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
+from tests.app.card import card
 from tests.app.command_line import Command, in_own_process
 from tests.synthetic_run import SIZE, picture, write_run
 from tracking.video import Video
 
 Image = NDArray[np.uint8]
 Floats = NDArray[np.float64]
-
-FRAMES = 240  # of the demo: the hand comes and goes in 196 to 238
-
-
-def card() -> Image:
-    """A test card: coloured squares, a disc, a word."""
-    y, x = np.mgrid[:420, :594]
-    hue = np.dstack([x / 594 * 179, np.full(x.shape, 150.0), np.full(x.shape, 230.0)]).astype(np.uint8)
-    squares = ((x // 33 + y // 35) % 2)[..., None] > 0
-    image = np.where(squares, cv2.cvtColor(hue, cv2.COLOR_HSV2BGR), 250).astype(np.uint8)
-    cv2.circle(image, (297, 210), 110, (40, 40, 200), -1, cv2.LINE_AA)
-    cv2.putText(image, "MODE", (215, 225), cv2.FONT_HERSHEY_SIMPLEX, 1.8, (255, 255, 255), 6, cv2.LINE_AA)
-    return image
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The demo, as its users have it, up to where the hand is gone."""
-    made = demo.sample()
-    path = tmp_path_factory.mktemp("demo") / "demo.rrd"
-    Session(Run(str(made.video), roi=made.roi, frames=f":{FRAMES}", output=Output(out=path)), Progress()).run()
-    return path
 
 
 @pytest.fixture
