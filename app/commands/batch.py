@@ -2,15 +2,14 @@
 
 import csv
 import hashlib
-import json
 import os
 import shlex
 import subprocess
-import sys
 import threading
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
@@ -19,21 +18,43 @@ from rich.table import Table
 from app.commands.batch_job import UNFINISHED, Job, Words, carry_out
 from app.options.batch import Batch
 from app.terminal.errors import UsageError
+from app.terminal.exit_code import ExitCode
 from app.terminal.progress import Progress
-from app.terminal.summary import in_words
+from app.terminal.summary import Summary, in_words
 
-SOME_FAILED = 1
-INTERRUPTED = 130
 COLUMNS = ("frames", "points", "rest_shape", "visible_share", "losses", "objects", "reprojection_rms_px", "fps")
 SHOWN = ("frames", "visible_share", "losses", "reprojection_rms_px", "fps")
 CONNECT_S = 5.0
 
 
-def batch(command: Batch, progress: Progress) -> int:
-    """Run what is not done yet, and tell about all.
+@dataclass(frozen=True)
+class Outcome(Summary):
+    """What came of all videos, those done before included: summary or error, by name."""
 
-    Returns:
-        exit code: 0, 1 when some failed, 130 when interrupted.
+    videos: list[Words]
+    skipped: int
+    failed: int
+    interrupted: bool
+
+    def print_table(self) -> None:
+        """One row per video."""
+        before = f", {self.skipped} done before" if self.skipped else ""
+        table = Table(title=f"{len(self.videos)} videos{before}", title_justify="left")
+        for column in ("video", *SHOWN, "result"):
+            table.add_column(column.replace("_", " "), overflow="fold")
+        for words in self.videos:
+            cells = ["" if words.get(name) is None else in_words(name, words[name]) for name in SHOWN]
+            table.add_row(str(words["name"]), *cells, f"FAILED: {words['error']}" if "error" in words else "ok")
+        Console().print(table)
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """Whether it was interrupted, or some failed."""
+        return ExitCode.INTERRUPTED if self.interrupted else ExitCode.SOME_FAILED if self.failed else ExitCode.DONE
+
+
+def batch(command: Batch, progress: Progress) -> Outcome:
+    """Run what is not done yet, and tell about all.
 
     Raises:
         UsageError: the folder cannot be written, or there is no such scheduler.
@@ -62,12 +83,7 @@ def batch(command: Batch, progress: Progress) -> int:
     if waiting:
         write_csv(command.out / "summary.csv", told)
     tidy(command.out / UNFINISHED)
-    if command.json:
-        summary = {"videos": told, "skipped": skipped, "failed": len(failed), "interrupted": interrupted}
-        sys.stdout.write(json.dumps(summary, indent=2) + "\n")
-    else:
-        print_table(told, skipped)
-    return INTERRUPTED if interrupted else SOME_FAILED if failed else 0
+    return Outcome(told, skipped, len(failed), interrupted)
 
 
 def make_jobs(command: Batch) -> list[Job]:
@@ -142,17 +158,6 @@ def on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[Job, Words]]:
         for future in ended(futures):  # type: ignore[no-untyped-call]
             failure, job = future.exception(), futures[future]
             yield job, {"source": job.video, "error": str(failure)} if failure else future.result()
-
-
-def print_table(told: list[Words], skipped: int) -> None:
-    """One row per video on stdout."""
-    table = Table(title=f"{len(told)} videos" + (f", {skipped} done before" if skipped else ""), title_justify="left")
-    for column in ("video", *SHOWN, "result"):
-        table.add_column(column.replace("_", " "), overflow="fold")
-    for words in told:
-        cells = ["" if words.get(name) is None else in_words(name, words[name]) for name in SHOWN]
-        table.add_row(str(words["name"]), *cells, f"FAILED: {words['error']}" if "error" in words else "ok")
-    Console().print(table)
 
 
 def write_csv(path: Path, told: list[Words]) -> None:

@@ -8,10 +8,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.terminal.exit_code import ExitCode
+
 Words = dict[str, object]
 
 UNFINISHED = "unfinished"
-BAD_INPUT, INTERRUPTED = 2, 130
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def carry_out(job: Job, started: Callable[["subprocess.Popen[str]"], None] = lam
     out, err = process.communicate()
     if process.returncode != 0:
         error = reason(process.returncode, err)
-        if process.returncode == BAD_INPUT:
+        if process.returncode == ExitCode.BAD_INPUT:
             unfinished.unlink(missing_ok=True)
             write(job.report, {"source": job.video, "error": error})
         return {"source": job.video, "error": error}
@@ -97,9 +98,9 @@ def reason(code: int, err: str) -> str:
     """Why a run ended, in one line."""
     lines = [line for line in err.splitlines() if line.strip()]
     last = lines[-1] if lines else ""
-    if code == BAD_INPUT:
+    if code == ExitCode.BAD_INPUT:
         return last.removeprefix("error: ")
-    if code == INTERRUPTED:
+    if code == ExitCode.INTERRUPTED:
         return "interrupted"
     return f"killed by signal {-code}" if code < 0 else f"exit code {code}: {last}"
 

@@ -2,7 +2,8 @@
 
 import os
 import platform
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 
 from rich.console import Console
 from rich.table import Table
@@ -13,13 +14,40 @@ from app.bench.targets import Ratios, markdown, rows
 from app.files.readme import put_table, with_table
 from app.files.writing import check_free, writable
 from app.options.bench import Bench
-from app.options.run import Words
 from app.terminal.progress import Progress
+from app.terminal.summary import Summary
+
+Row = dict[str, object]
 
 README_TABLE = "bench"
 
 
-def bench(command: Bench, progress: Progress) -> Words:
+@dataclass(frozen=True)
+class Benchmarks(Summary):
+    """Everything that was measured; rows of the tables as dictionaries."""
+
+    machine: Mapping[str, str | int | None]
+    quick: bool
+    ratios: Ratios
+    missed: list[str]
+    window: list[Row]
+    rivals: list[Row]
+    basis: list[Row]
+    runs: list[Row]
+    ceres: bool
+
+    def print_table(self) -> None:
+        """The tables, and the ratios beside their targets."""
+        console = Console()
+        tables = {"Window step": self.window, "Rivals": self.rivals, "Basis": self.basis, "Whole runs": self.runs}
+        for title, measured in tables.items():
+            console.print(as_table(title, measured))
+        console.print(with_targets(self.ratios))
+        if not self.ceres:
+            console.print("Ceres took no part: pyceres is not installed; pip install 'modeshape[bench]'")
+
+
+def bench(command: Bench, progress: Progress) -> Benchmarks:
     """Measure; with `--plot` and `--readme`, write.
 
     Raises:
@@ -49,17 +77,17 @@ def bench(command: Bench, progress: Progress) -> Words:
             draw(file, command.plot.suffix[1:], timings, races, basis_times)
     if command.readme:
         put_table(command.readme, README_TABLE, markdown(ratios, in_words(machine())))
-    return {
-        "machine": machine(),
-        "quick": quick,
-        "ratios": ratios,
-        "missed": [what for what, _, _, met in rows(ratios) if not met],
-        "window": [asdict(timing) for timing in timings],
-        "rivals": [asdict(race) for race in races],
-        "basis": [asdict(time) for time in basis_times],
-        "runs": [asdict(run) for run in runs],
-        "ceres": races[0].ceres_ms is not None,
-    }
+    return Benchmarks(
+        machine=machine(),
+        quick=quick,
+        ratios=ratios,
+        missed=[what for what, _, _, met in rows(ratios) if not met],
+        window=[asdict(timing) for timing in timings],
+        rivals=[asdict(race) for race in races],
+        basis=[asdict(time) for time in basis_times],
+        runs=[asdict(run) for run in runs],
+        ceres=races[0].ceres_ms is not None,
+    )
 
 
 def machine() -> dict[str, str | int | None]:
@@ -72,21 +100,7 @@ def in_words(facts: dict[str, str | int | None]) -> str:
     return f"{facts['cores']} cores ({facts['processor']}), Python {facts['python']}; window step and basis on one core."
 
 
-def print_tables(words: Words) -> None:
-    """For people, on stdout."""
-    console = Console()
-    ratios, ceres = words["ratios"], words["ceres"]
-    assert isinstance(ratios, dict)
-    for title, name in (("Window step", "window"), ("Rivals", "rivals"), ("Basis", "basis"), ("Whole runs", "runs")):
-        measured = words[name]
-        assert isinstance(measured, list)
-        console.print(as_table(title, measured))
-    console.print(with_targets(ratios))
-    if not ceres:
-        console.print("Ceres took no part: pyceres is not installed; pip install 'modeshape[bench]'")
-
-
-def as_table(title: str, measured: list[dict[str, object]]) -> Table:
+def as_table(title: str, measured: list[Row]) -> Table:
     """A row for each."""
     table = Table(title=title, title_justify="left")
     for name in measured[0]:

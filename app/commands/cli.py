@@ -6,7 +6,10 @@ import os
 import re
 import signal
 import sys
-from typing import Annotated, NoReturn
+from functools import reduce
+from importlib import import_module
+from operator import or_
+from typing import Annotated, Any, NoReturn
 
 import tyro
 
@@ -18,47 +21,58 @@ from app.options.retexture import Retexture
 from app.options.run import Demo, Evaluate, Review, Run
 from app.recording.environment import environment
 from app.terminal.errors import UsageError, in_a_line
+from app.terminal.exit_code import ExitCode
 
-Command = (
-    Annotated[Run, tyro.conf.subcommand("run")]
-    | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
-    | Annotated[Demo, tyro.conf.subcommand("demo")]
-    | Annotated[Review, tyro.conf.subcommand("review")]
-    | Annotated[Retexture, tyro.conf.subcommand("retexture")]
-    | Annotated[Export, tyro.conf.subcommand("export")]
-    | Annotated[Batch, tyro.conf.subcommand("batch")]
-    | Annotated[Modes, tyro.conf.subcommand("modes")]
-    | Annotated[Reproduce, tyro.conf.subcommand("reproduce")]
-    | Annotated[Bench, tyro.conf.subcommand("bench")]
-)
+# Each command: its options, and the function that carries it out, given options and progress; it returns a summary.
+COMMANDS: dict[str, tuple[type, str]] = {
+    "run": (Run, "app.commands.run:run"),
+    "evaluate": (Evaluate, "app.pipeline.evaluate:evaluate"),
+    "demo": (Demo, "app.commands.demo:demo"),
+    "review": (Review, "app.commands.review:review"),
+    "retexture": (Retexture, "app.commands.retexture:retexture"),
+    "export": (Export, "app.commands.export:export"),
+    "batch": (Batch, "app.commands.batch:batch"),
+    "modes": (Modes, "app.commands.modes:modes"),
+    "reproduce": (Reproduce, "app.commands.reproduce:reproduce"),
+    "bench": (Bench, "app.commands.bench:bench"),
+}
 
 DESCRIPTION = """One ordinary video of a deforming surface becomes a moving 3-D mesh, live.
 
 Start with `modeshape demo`, then `modeshape run your_video.mp4 --roi X Y W H`."""
 
-BAD_INPUT = 2
-INTERRUPTED = 130
-
 
 def main() -> NoReturn:
-    """Entry point of the `modeshape` script; exit code 2 means that something asked for cannot be done."""
+    """Entry point of the `modeshape` script; see `ExitCode` for how it ends."""
     os.environ.update(environment())
     try:
-        sys.exit(run(parse()))
+        sys.exit(carry_out(parse(sys.argv[1:])))
     except ValueError as error:
         if not is_ours(error):
             raise
         fail(in_a_line(error))
     except KeyboardInterrupt:
-        sys.exit(INTERRUPTED)
+        sys.exit(ExitCode.INTERRUPTED)
 
 
-def parse() -> Run | Evaluate | Demo | Review | Retexture | Export | Modes | Batch | Reproduce | Bench:
-    """The command asked for; a mistake is told in one line instead of a panel."""
+def parse(arguments: list[str]) -> Any:
+    """The options of the command asked for; a mistake is told in one line instead of a panel."""
+    if arguments == ["--version"]:
+        from importlib.metadata import version
+
+        sys.stdout.write(f"modeshape {version('modeshape')}\n")
+        sys.exit(ExitCode.DONE)
+    commands: Any = reduce(or_, [Annotated[kind, tyro.conf.subcommand(name)] for name, (kind, _) in COMMANDS.items()])
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
-            return tyro.cli(Command, prog="modeshape", description=DESCRIPTION, config=(tyro.conf.AvoidSubcommands,))
+            return tyro.cli(
+                commands,
+                prog="modeshape",
+                args=arguments or ["--help"],
+                description=DESCRIPTION,
+                config=(tyro.conf.AvoidSubcommands,),
+            )
     except SystemExit as stop:
         if stop.code in (0, None):
             raise
@@ -74,63 +88,21 @@ def in_one_line(panel: str) -> str:
     return f"{what}; see {where.group() if where else 'modeshape --help'}"
 
 
-def run(command: Run | Evaluate | Demo | Review | Retexture | Export | Modes | Batch | Reproduce | Bench) -> int:
-    """Carry out a command; returns the exit code."""
+def carry_out(options: Any) -> ExitCode:
+    """Call the command's function and print its summary."""
     from app.terminal.progress import Progress
-    from app.terminal.summary import as_json, as_table
+    from app.terminal.summary import Summary
 
     signal.signal(signal.SIGTERM, interrupt)
-    if isinstance(command, Review):
-        from app.commands.review import review
-
-        review(command, Progress())
-        return 0
-    if isinstance(command, Batch):
-        from app.commands.batch import batch
-
-        return batch(command, Progress("starting"))
-    if isinstance(command, Bench):
-        from app.commands.bench import bench, print_tables
-
-        words = bench(command, Progress("measuring"))
-        (as_json if command.json else print_tables)(words)
-        return 0
-    if isinstance(command, Evaluate):
-        from app.pipeline.evaluate import evaluate
-
-        words, printed_as_json = evaluate(command, Progress()), command.json
-    elif isinstance(command, Demo):
-        from app.commands.demo import demo
-
-        words, printed_as_json = demo(command), command.json
-    elif isinstance(command, Retexture):
-        from app.commands.retexture import retexture
-
-        words, printed_as_json = retexture(command, Progress()), command.json
-    elif isinstance(command, Export):
-        from app.commands.export import export
-
-        words, printed_as_json = export(command, Progress("reading")), command.json
-    elif isinstance(command, Modes):
-        from app.commands.modes import modes
-
-        words, printed_as_json = modes(command, Progress("reading")), command.json
-    elif isinstance(command, Reproduce):
-        from app.commands.reproduce import reproduce, summary
-
-        words, printed_as_json = reproduce(command), command.json
-        words = words if printed_as_json else summary(words)
+    module, function = next(place for kind, place in COMMANDS.values() if kind is type(options)).split(":")
+    summary: Summary = getattr(import_module(module), function)(options, Progress())
+    if options.json:
+        sys.stdout.write(summary.as_json() + "\n")
     else:
-        from app.pipeline.session import Session
-
-        words, printed_as_json = Session(command, Progress()).run().as_dict(), command.output.json
-    if printed_as_json:
-        as_json(words)
-    else:
-        as_table("modeshape", words)
-        if words.get("recording"):
-            sys.stderr.write(f"look at it with: rerun {words['recording']}\n")
-    return INTERRUPTED if words.get("interrupted") else 0
+        summary.print_table()
+        if summary.hint:
+            sys.stderr.write(f"{summary.hint}\n")
+    return summary.exit_code
 
 
 def interrupt(_signum: int, _frame: object) -> NoReturn:
@@ -151,4 +123,4 @@ def is_ours(error: ValueError) -> bool:
 def fail(text: str) -> NoReturn:
     """One line on stderr, exit code 2."""
     sys.stderr.write(f"error: {text}\n")
-    sys.exit(BAD_INPUT)
+    sys.exit(ExitCode.BAD_INPUT)

@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Literal
@@ -13,10 +14,10 @@ from numpy.typing import NDArray
 
 from app.files.writing import check_free, writable
 from app.options.export import Export
-from app.options.run import Words
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
+from app.terminal.summary import Summary
 
 Array = NDArray[np.float64]
 
@@ -35,7 +36,20 @@ OWN_FILES = (
 UPRIGHT = np.array([1.0, -1.0, -1.0])  # half a turn about x: y up, z towards the viewer
 
 
-def export(command: Export, progress: Progress) -> Words:
+@dataclass(frozen=True)
+class Exported(Summary):
+    """What was written."""
+
+    exported: Path
+    format: str
+    frames: int
+    frames_with_shape: int
+    points: int
+    out: Path
+    megabytes: float
+
+
+def export(command: Export, progress: Progress) -> Exported:
     """Carry out the command.
 
     Returns:
@@ -79,15 +93,15 @@ def export(command: Export, progress: Progress) -> Words:
         else:
             with complete_folder(out) as folder:
                 write_meshes(playback, folder, command, advance)
-    return {
-        "exported": str(playback.path),
-        "format": kind,
-        "frames": len(playback.frames),
-        "frames_with_shape": int(playback.shaped.sum()),
-        "points": playback.W.shape[2],
-        "out": str(out),
-        "megabytes": megabytes(out),
-    }
+    return Exported(
+        exported=playback.path,
+        format=kind,
+        frames=len(playback.frames),
+        frames_with_shape=int(playback.shaped.sum()),
+        points=playback.W.shape[2],
+        out=out,
+        megabytes=megabytes(out),
+    )
 
 
 def write_glb(playback: Playback, out: Path) -> None:

@@ -1,6 +1,7 @@
 """`modeshape modes`: the mode shapes of a recording's or of given tracks' rest shape as a figure."""
 
 import zipfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
@@ -9,9 +10,10 @@ from threadpoolctl import threadpool_limits
 
 from app.files.writing import check_free, writable
 from app.options.export import Modes
-from app.options.run import Evaluate, Words
+from app.options.run import Evaluate
 from app.recording.modes_figure import modes_figure, spectrum, title_of
 from app.terminal.progress import Progress
+from app.terminal.summary import Summary
 from reconstruction.basis.distances import fitting
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.modes import ModalBasis
@@ -19,7 +21,20 @@ from reconstruction.basis.rest_shape import is_flat
 from reconstruction.settings import Metric, MetricChoice
 
 
-def modes(command: Modes, progress: Progress) -> Words:
+@dataclass(frozen=True)
+class Drawn(Summary):
+    """What was drawn: the eigenvalues shown, and their share of the sum of all."""
+
+    source: Path
+    points: int
+    modes: int
+    metric: str
+    eigenvalues: list[float]
+    share: float
+    out: Path
+
+
+def modes(command: Modes, progress: Progress) -> Drawn:
     """Carry out the command.
 
     Returns:
@@ -36,15 +51,15 @@ def modes(command: Modes, progress: Progress) -> Words:
         png = modes_figure(basis, mesh, eigenvalues, title=title_of(name, basis, metric), columns=command.columns)
     with writable(command.out) as file:
         file.write(png)
-    return {
-        "source": str(command.source),
-        "points": basis.rest.shape[1],
-        "modes": len(basis.eigenvalues),
-        "metric": metric,
-        "eigenvalues": basis.eigenvalues.tolist(),
-        "share": float(basis.eigenvalues.sum() / eigenvalues.clip(0).sum()),
-        "out": str(command.out),
-    }
+    return Drawn(
+        source=command.source,
+        points=basis.rest.shape[1],
+        modes=len(basis.eigenvalues),
+        metric=metric,
+        eigenvalues=basis.eigenvalues.tolist(),
+        share=float(basis.eigenvalues.sum() / eigenvalues.clip(0).sum()),
+        out=command.out,
+    )
 
 
 def of_recording(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, Metric]:

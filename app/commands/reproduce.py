@@ -1,24 +1,51 @@
 """`modeshape reproduce`: the experiments one after another, with a report that is complete after each."""
 
 import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 from app.files.readme import put_table, with_table
 from app.options.reproduce import Reproduce
-from app.options.run import Words
 from app.reproduce.catalog import CATALOG
 from app.reproduce.experiment import Experiment
 from app.reproduce.report import Report
 from app.reproduce.work import Effort, Work
 from app.terminal.errors import UsageError
+from app.terminal.exit_code import ExitCode
+from app.terminal.progress import Progress
+from app.terminal.summary import Summary, print_rows
 
 README_TABLE = "reproduce"
 
 
-def reproduce(command: Reproduce) -> Words:
+@dataclass(frozen=True)
+class Reproduced(Summary):
+    """The report, and what is not in it: files missing by experiment."""
+
+    machine: Mapping[str, object]
+    experiments: Mapping[str, Mapping[str, Any]]
+    skipped: Mapping[str, list[str]]
+    interrupted: bool
+    report: Path
+
+    def print_table(self) -> None:
+        """The headlines."""
+        headlines = [headline for stored in self.experiments.values() for headline in stored["headlines"]]
+        rows = {f"{one['data']}; {one['setting']}": in_words(one) for one in headlines}
+        print_rows(rows | {"interrupted": self.interrupted, "report": self.report})
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """Whether it was interrupted."""
+        return ExitCode.INTERRUPTED if self.interrupted else ExitCode.DONE
+
+
+def reproduce(command: Reproduce, _: Progress) -> Reproduced:
     """Carry out the command.
 
     Returns:
@@ -52,7 +79,7 @@ def reproduce(command: Reproduce) -> Words:
             interrupted = True
     if command.readme and not interrupted:
         put_table(command.readme, README_TABLE, report.headlines())
-    return report.as_words() | {"skipped": skipped, "interrupted": interrupted, "report": str(report.markdown_path)}
+    return Reproduced(**report.as_words(), skipped=skipped, interrupted=interrupted, report=report.markdown_path)
 
 
 def run_one(experiment: Experiment, work: Work, report: Report) -> None:
@@ -70,16 +97,9 @@ def needed(experiments: list[Experiment]) -> list[str]:
     return list(dict.fromkeys(file for experiment in experiments for file in experiment.files))
 
 
-def summary(words: Words) -> Words:
-    """The outcome for a terminal: the headlines."""
-    experiments = words["experiments"]
-    assert isinstance(experiments, dict)
-    rows: Words = {}
-    for stored in experiments.values():
-        for headline in stored["headlines"]:
-            e3d, static = headline["e3d"], headline["e3d_static"]
-            text = "failed" if e3d is None else f"e3d {e3d:.2f} %"
-            text += f", rest shape alone {static:.2f} %" if static is not None else ""
-            others = f"; {headline['others']}" if headline["others"] else ""
-            rows[f"{headline['data']}; {headline['setting']}"] = text + others
-    return rows | {"interrupted": words["interrupted"], "report": words["report"]}
+def in_words(headline: Mapping[str, Any]) -> str:
+    """An experiment's most important figures in a line."""
+    e3d, static = headline["e3d"], headline["e3d_static"]
+    text = "failed" if e3d is None else f"e3d {e3d:.2f} %"
+    text += f", rest shape alone {static:.2f} %" if static is not None else ""
+    return text + (f"; {headline['others']}" if headline["others"] else "")

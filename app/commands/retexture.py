@@ -1,6 +1,7 @@
 """`modeshape retexture`: a picture on the moving surface, from a recording or live while a video is tracked."""
 
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from types import TracebackType
@@ -14,14 +15,17 @@ from app.commands.export import steady
 from app.files.video_out import PacedVideo, VideoSink, check_video_format
 from app.files.writing import check_free
 from app.options.retexture import Retexture
-from app.options.run import Words, parse_range
+from app.options.run import parse_range
 from app.painting.compositing import Compositor, Placement
 from app.painting.picture import Texture
 from app.pipeline.interrupts import completed
 from app.pipeline.session import Session
+from app.pipeline.summary import RunSummary
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
+from app.terminal.exit_code import ExitCode
 from app.terminal.progress import Progress
+from app.terminal.summary import Summary
 from reconstruction.basis.model import Model
 from reconstruction.estimate import ShapeEstimate
 from tracking.klt import Observation
@@ -31,7 +35,41 @@ RRD_MAGIC = b"RRF"
 STILL_PX = 1.0
 
 
-def retexture(command: Retexture, progress: Progress) -> Words:
+@dataclass(frozen=True)
+class Played(Summary):
+    """A recording whose pictures were painted on."""
+
+    source: str
+    frames: int
+    interrupted: bool
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """Whether it was interrupted."""
+        return ExitCode.INTERRUPTED if self.interrupted else ExitCode.DONE
+
+
+@dataclass(frozen=True)
+class Painted(Summary):
+    """What was painted, after what it was painted on."""
+
+    on: RunSummary | Played
+    painted_frames: int
+    paint_ms: float | None
+    out: Path
+
+    @property
+    def hint(self) -> str:
+        """Of a run, how to look at the recording."""
+        return self.on.hint
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """Whether it was interrupted."""
+        return self.on.exit_code
+
+
+def retexture(command: Retexture, progress: Progress) -> Painted:
     """Carry out the command.
 
     Returns:
@@ -43,8 +81,8 @@ def retexture(command: Retexture, progress: Progress) -> Words:
     check_video_format(command.out)
     check_free(command.out, overwrite=command.overwrite)
     with Texture(command.texture) as texture, Painter(command, texture) as painter:
-        words = (play if is_recording(command.source) else follow)(command, painter, progress)
-    return words | {"painted_frames": painter.painted, "paint_ms": painter.milliseconds, "out": str(command.out)}
+        on = (play if is_recording(command.source) else follow)(command, painter, progress)
+    return Painted(on, painter.painted, painter.milliseconds, command.out)
 
 
 class Painter:
@@ -114,7 +152,7 @@ class Painter:
         self._sink.__exit__(kind, error, trace)
 
 
-def follow(command: Retexture, painter: Painter, progress: Progress) -> Words:
+def follow(command: Retexture, painter: Painter, progress: Progress) -> RunSummary:
     """Let a painter see a video while it is tracked.
 
     Raises:
@@ -132,10 +170,10 @@ def follow(command: Retexture, painter: Painter, progress: Progress) -> Words:
                     painter.frame(one.frame, one.observation, one.estimate)
             except KeyboardInterrupt:
                 session.interrupted = True
-    return session.summary.as_dict()
+    return session.summary
 
 
-def play(command: Retexture, painter: Painter, progress: Progress) -> Words:
+def play(command: Retexture, painter: Painter, progress: Progress) -> Played:
     """Let a painter see a recording.
 
     Raises:
@@ -181,7 +219,7 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Words:
             interrupted = True
     if not begun:
         raise UsageError(f"{playback.path} contains no pictures: run again with --image jpeg or --image video")
-    return {"source": command.source, "frames": len(playback.frames), "interrupted": interrupted}
+    return Played(command.source, len(playback.frames), interrupted)
 
 
 def first_frame(playback: Playback, i: int, image: Image) -> Image:

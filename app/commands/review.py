@@ -3,24 +3,52 @@
 import csv
 import io
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import cast
 
 from rich.console import Console
 from rich.table import Table
 
 from app.files.writing import check_free, writable
-from app.options.run import Review, Words
-from app.playback.measures import Reviewed, as_words, per_frame, reviewed
+from app.options.run import Review
+from app.playback.facts import Facts, facts
+from app.playback.measures import Reviewed, per_frame, reviewed
 from app.playback.playback import Playback
 from app.terminal.progress import Progress
-from app.terminal.summary import as_json
+from app.terminal.summary import Summary
 
 # Parts of the configuration that have a row of their own, or say nothing about the result.
 ELSEWHERE = ("source", "out", "overwrite", "tracks_out", "shapes_out", "view", "connect", "json")
 
 
-def review(command: Review, progress: Progress) -> None:
+@dataclass(frozen=True)
+class Comparison(Summary):
+    """The facts of one recording, or of two."""
+
+    recordings: list[Facts]
+
+    def as_dict(self) -> dict[str, object]:
+        """Of one recording its facts alone."""
+        each = [one.as_dict() for one in self.recordings]
+        return each[0] if len(each) == 1 else {"recordings": each}
+
+    def print_table(self) -> None:
+        """Facts by row, recordings by column."""
+        columns = [as_rows(one) for one in self.recordings]
+        if len(columns) == 2:
+            columns = [shared_configuration(mine, other) for mine, other in zip(columns, reversed(columns), strict=True)]
+        table = Table(title="modeshape review", show_header=False, title_justify="left", row_styles=["", "dim"])
+        table.add_column(no_wrap=True)
+        for _ in columns:
+            table.add_column(overflow="fold", ratio=1)
+        for name in dict.fromkeys(name for column in columns for name in column):
+            cells = [column.get(name, "") for column in columns]
+            if any(cells):
+                table.add_row(name, *cells)
+        Console().print(table, highlight=False)
+
+
+def review(command: Review, progress: Progress) -> Comparison:
     """Carry out the command.
 
     Raises:
@@ -49,16 +77,12 @@ def review(command: Review, progress: Progress) -> None:
 
         with writable(command.plot) as file:
             write_review(file, command.plot.suffix, both)
-    words = [as_words(one.playback, one.measured) for one in both]
-    if command.json:
-        as_json(words[0] if len(words) == 1 else {"recordings": words})
-    else:
-        print_table(words)
     if url or command.view:
         from app.playback.comparison import show
         from app.recording.viewer import spawned_viewer
 
         show(both, url or spawned_viewer())
+    return Comparison([facts(one.playback, one.measured) for one in both])
 
 
 def write_csv(path: Path, both: list[Reviewed]) -> None:
@@ -79,53 +103,32 @@ def write_csv(path: Path, both: list[Reviewed]) -> None:
         text.detach()
 
 
-def print_table(words: list[Words]) -> None:
-    """Facts by row, recordings by column, on stdout."""
-    columns = [as_rows(one) for one in words]
-    if len(words) == 2:
-        columns = [shared_configuration(mine, other) for mine, other in zip(columns, reversed(columns), strict=True)]
-    table = Table(title="modeshape review", show_header=False, title_justify="left", row_styles=["", "dim"])
-    table.add_column(no_wrap=True)
-    for _ in words:
-        table.add_column(overflow="fold", ratio=1)
-    for name in dict.fromkeys(name for column in columns for name in column):
-        cells = [column.get(name, "") for column in columns]
-        if any(cells):
-            table.add_row(name, *cells)
-    Console().print(table, highlight=False)
-
-
-def as_rows(words: Words) -> dict[str, str]:
+def as_rows(facts: Facts) -> dict[str, str]:
     """Facts as a person reads them, by label."""
-    share = cast(Mapping[str, float], words["visible_share"])
-    error = cast(Mapping[str, float] | None, words["reprojection_px"])
-    stages = cast(Mapping[str, Mapping[str, float]], words["stage_ms"])
-    phases = cast(list[Mapping[str, object]], words["phases"])
-    worst = cast(list[Mapping[str, float]], words["worst_frames"])
-    events = cast(list[Mapping[str, object]], words["events"])
-    note = words["rest_shape_note"]
+    share, error, note = facts.visible_share, facts.reprojection_px, facts.rest_shape_note
     rows = {
-        "recording": str(words["recording"]),
-        "source": known(words["source"]),
-        "frames": f"{words['frames']} ({words['first_frame']} to {words['last_frame']}, {words['duration_s']:.2f} s), "
-        f"{words['frames_with_shape']} with a shape",
-        "phases": ", ".join(f"{p['phase']} {p['first']}–{p['last']}" for p in phases),
-        "rest shape": known(words["rest_shape"]) + (f": {note}" if note else ""),
-        "deformation": f"{known(words['deformation'])}, {words['modes']} modes of {known(words['metric'])} distances",
-        "points": f"{words['points']}, {words['losses']} losses, {words['recoveries']} recoveries",
+        "recording": str(facts.recording),
+        "source": known(facts.source),
+        "frames": f"{facts.frames} ({facts.first_frame} to {facts.last_frame}, {facts.duration_s:.2f} s), "
+        f"{facts.frames_with_shape} with a shape",
+        "phases": ", ".join(f"{p['phase']} {p['first']}–{p['last']}" for p in facts.phases),
+        "rest shape": known(facts.rest_shape) + (f": {note}" if note else ""),
+        "deformation": f"{known(facts.deformation)}, {facts.modes} modes of {known(facts.metric)} distances",
+        "points": f"{facts.points}, {facts.losses} losses, {facts.recoveries} recoveries",
         "visible": f"{share['mean']:.1%} (lowest {share['min']:.1%}, last frame {share['last']:.1%})",
         "reprojection, px": named(error, ("mean", "median", "p95", "max", "rms"), "{:.3g}") if error else "",
-        "worst frames, RMS px": ", ".join(f"{w['frame']} ({w['rms_px']:.2f})" for w in worst),
+        "worst frames, RMS px": ", ".join(f"{w['frame']} ({w['rms_px']:.2f})" for w in facts.worst_frames),
     }
-    for stage, numbers in stages.items():
+    for stage, numbers in facts.stage_ms.items():
         rows[f"{stage}, ms"] = named(numbers, ("mean", "p95"), "{:.1f}")
-    rows["fps"] = f"{words['fps']:.1f}" if words["fps"] else ""
+    rows["fps"] = f"{facts.fps:.1f}" if facts.fps else ""
     for name in ("e3d", "e3d_camera", "e3d_static", "e3d_sign_free"):
-        rows[name] = f"{words[name]:.2%}" if words[name] is not None else ""
-    rows["events"] = "\n".join(f"{e['frame']}: {e['text']}" for e in events if e["text"] != note)
-    rows["notes"] = "\n".join(cast(list[str], words["notes"]))
-    configuration = cast(Words, words["configuration"]).items()
-    rows["configuration"] = "\n".join(f"{k} {v}" for k, v in configuration if v is not None and k not in ELSEWHERE)
+        score = getattr(facts, name)
+        rows[name] = f"{score:.2%}" if score is not None else ""
+    rows["events"] = "\n".join(f"{e['frame']}: {e['text']}" for e in facts.events if e["text"] != note)
+    rows["notes"] = "\n".join(facts.notes)
+    told = [f"{k} {v}" for k, v in facts.configuration.items() if v is not None and k not in ELSEWHERE]
+    rows["configuration"] = "\n".join(told)
     return {name: text for name, text in rows.items() if text}
 
 

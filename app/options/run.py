@@ -112,6 +112,11 @@ class Run(Source):
         super().__post_init__()
         check_laid(self.place, self.opacity)
 
+    @property
+    def json(self) -> bool:
+        """Whether the summary is printed as JSON."""
+        return self.output.json
+
 
 @dataclass(frozen=True)
 class Evaluate:

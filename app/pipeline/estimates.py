@@ -3,11 +3,13 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.files.writing import writable
+from app.terminal.summary import Summary
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model
 from reconstruction.estimate import ShapeEstimate
@@ -78,18 +80,23 @@ class Collected:
         return score(shapes, still, truth.S[chosen][:, :, inside], truth.frames[chosen])
 
 
-def score_words(result: Score | None) -> dict[str, object]:
-    """A score as it is printed."""
-    if result is None:
-        return {}
-    return {
-        "e3d": result.e3d,
-        "e3d_camera": result.e3d_camera,
-        "e3d_static": result.e3d_static,
-        "e3d_sign_free": result.e3d_sign_free,
-        "truth_points": result.points,
-        "truth_frames": len(result.frames),
-    }
+@dataclass(frozen=True)
+class Scores(Summary):
+    """A score as it is told: errors against the truth, and how many points and frames of it there are."""
+
+    e3d: float
+    e3d_camera: float
+    e3d_static: float
+    e3d_sign_free: float
+    truth_points: int
+    truth_frames: int
+
+    @classmethod
+    def of(cls, result: Score) -> Self:
+        """Without the errors of single frames."""
+        return cls(
+            result.e3d, result.e3d_camera, result.e3d_static, result.e3d_sign_free, result.points, len(result.frames)
+        )
 
 
 def save_shapes(path: Path, estimates: Mapping[int, ShapeEstimate], model: Model, lost: Iterable[int] = ()) -> None:

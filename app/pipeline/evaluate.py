@@ -1,6 +1,7 @@
 """Reconstruct given tracks and score them against the truth in their file."""
 
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
@@ -9,11 +10,12 @@ from threadpoolctl import threadpool_limits
 
 from app.files.mesh_file import rest_of_vertices
 from app.files.writing import check_free
-from app.options.run import Evaluate, Words
-from app.pipeline.estimates import Collected, save_shapes, score_words
+from app.options.run import Evaluate
+from app.pipeline.estimates import Collected, Scores, save_shapes
 from app.pipeline.prepare import RECOVERED, settings_of
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
+from app.terminal.summary import Summary
 from reconstruction.basis import rest_shape
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.rest_shape import RestShape
@@ -23,7 +25,29 @@ from reconstruction.online import Reconstruction
 from tracking.tracks import Tracks
 
 
-def evaluate(config: Evaluate, progress: Progress) -> Words:
+@dataclass(frozen=True, kw_only=True)
+class Evaluation(Summary):
+    """What came of given tracks; the score is there if the truth is."""
+
+    tracks: str
+    frames: int
+    points: int
+    modes: int
+    rest_shape: str
+    rest_shape_note: str
+    focal_px: float | None
+    focal_note: str = ""
+    bootstrap_frames: int
+    deformation: str
+    metric: str | None
+    priors: Mapping[str, float]
+    branch_switches: int
+    reprojection_rms: float | None
+    ms_per_frame: float
+    score: Scores | None = None
+
+
+def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
     """Run the reconstruction over a track file.
 
     Returns:
@@ -57,26 +81,29 @@ def evaluate(config: Evaluate, progress: Progress) -> Words:
     assert rest is not None
     if config.shapes_out:
         save_shapes(config.shapes_out, collected.estimates, reconstruction.model)
-    words: Words = {
-        "tracks": str(config.tracks),
-        "frames": frames,
-        "points": points,
-        "modes": config.model.modes,
-        "rest_shape": rest.kind,
-        "rest_shape_note": rest.note,
-        **reconstruction.focal_words,
-        "bootstrap_frames": reconstruction.bootstrap_frames,
-        "deformation": reconstruction.deformation,
-        "metric": reconstruction.metric,
-        "priors": reconstruction.weights,
-        "branch_switches": collected.switches,
-        "reprojection_rms": collected.reprojection_rms_px,
-        "ms_per_frame": elapsed_ms / frames,
-    }
+    scores = None
     if tracks.S_gt is not None and tracks.gt_frames is not None:
         shapes = np.stack([collected.estimates[int(f)].shape for f in tracks.gt_frames])
-        words |= score_words(score(shapes, rest.motion.shape, tracks.S_gt, tracks.gt_frames))
-    return words
+        scores = Scores.of(score(shapes, rest.motion.shape, tracks.S_gt, tracks.gt_frames))
+    camera = reconstruction.camera
+    return Evaluation(
+        tracks=str(config.tracks),
+        frames=frames,
+        points=points,
+        modes=config.model.modes,
+        rest_shape=rest.kind,
+        rest_shape_note=rest.note,
+        focal_px=camera.focal_px if camera.perspective else None,
+        focal_note=reconstruction.focal_note,
+        bootstrap_frames=reconstruction.bootstrap_frames,
+        deformation=reconstruction.deformation,
+        metric=reconstruction.metric,
+        priors=reconstruction.weights,
+        branch_switches=collected.switches,
+        reprojection_rms=collected.reprojection_rms_px,
+        ms_per_frame=elapsed_ms / frames,
+        score=scores,
+    )
 
 
 def prepare(config: Evaluate, tracks: Tracks) -> Reconstruction:

@@ -1,18 +1,19 @@
 """What came out of a run, for people and programs."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 from app.pipeline.counts import Counts
-from app.pipeline.estimates import score_words
+from app.pipeline.estimates import Scores
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
-from reconstruction.evaluation import Score
+from app.terminal.exit_code import ExitCode
+from app.terminal.summary import Summary
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunSummary:
+class RunSummary(Summary):
     """Counts of the whole run, and what came out for one object; what has a default may be unknown, and is left out then.
 
     Attributes:
@@ -58,7 +59,7 @@ class RunSummary:
     focal_note: str | None = None
     branch_switches: int
     reprojection_rms_px: float | None
-    score: Score | None = None
+    score: Scores | None = None
     visible_share: float | None
     visible_share_last: float | None
     objects: int
@@ -71,16 +72,15 @@ class RunSummary:
     parts: int | None = None
     last_part: Path | None = None
 
-    def as_dict(self) -> dict[str, object]:
-        """Names and values as they are printed and recorded."""
-        words: dict[str, object] = {}
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, Score):
-                words |= score_words(value)
-            elif value is not None or field.default is MISSING:
-                words[field.name] = str(value) if isinstance(value, Path) else value
-        return words
+    @property
+    def hint(self) -> str:
+        """How to look at the recording."""
+        return f"look at it with: rerun {self.recording}" if self.recording else ""
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """Whether it was interrupted."""
+        return ExitCode.INTERRUPTED if self.interrupted else ExitCode.DONE
 
 
 def summary_of(
@@ -105,7 +105,7 @@ def summary_of(
         focal_note=reconstruction.focal_note or None,
         branch_switches=collected.switches,
         reprojection_rms_px=collected.reprojection_rms_px,
-        score=tracked.score,
+        score=Scores.of(tracked.score) if tracked.score else None,
         visible_share=counts.visible_share,
         visible_share_last=counts.visible_share_last,
         objects=counts.objects,

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from app.files.chart_style import STYLE
-from app.playback.measures import Reviewed, phase_ranges
+from app.playback.facts import phase_ranges
+from app.playback.measures import Reviewed
 from app.terminal.errors import UsageError
 
 FORMATS = (".png", ".pdf", ".svg")

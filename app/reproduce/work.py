@@ -98,7 +98,7 @@ class Work:
         """The scores of `modeshape evaluate`; a step. The same again is not computed again."""
         if config not in self._trials:
             try:
-                self._trials[config] = Trial(evaluate(config, Part()))
+                self._trials[config] = Trial(evaluate(config, Part()).as_dict())
             except ReconstructionError as error:
                 self._trials[config] = Trial({}, in_a_line(error))
         self.step()

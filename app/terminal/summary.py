@@ -1,23 +1,58 @@
 """What a command prints at its end: a table for people, JSON for programs."""
 
 import json
-import sys
 from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
+from app.terminal.exit_code import ExitCode
+
 PERCENT = ("visible_share", "visible_share_last", "e3d", "e3d_camera", "e3d_static", "e3d_sign_free")
 
 
-def as_json(words: Mapping[str, object]) -> None:
-    """One JSON object on stdout."""
-    sys.stdout.write(json.dumps(words, indent=2) + "\n")
+@dataclass(frozen=True)
+class Summary:
+    """What came of a command; its fields are the keys of the JSON and the rows of the table, in their order.
+
+    A field with a default is left out where it has this value. One that is a summary itself is told field by field.
+    """
+
+    def as_dict(self) -> dict[str, object]:
+        """The fields by name, ready for JSON."""
+        words: dict[str, object] = {}
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, Summary):
+                words |= value.as_dict()
+            elif field.default is MISSING or value != field.default:
+                words[field.name] = str(value) if isinstance(value, Path) else value
+        return words
+
+    def as_json(self) -> str:
+        """One JSON object."""
+        return json.dumps(self.as_dict(), indent=2)
+
+    def print_table(self) -> None:
+        """A table on stdout."""
+        print_rows(self.as_dict())
+
+    @property
+    def hint(self) -> str:
+        """What to do next, for people; empty if there is nothing to say."""
+        return ""
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """How the command ended."""
+        return ExitCode.DONE
 
 
-def as_table(title: str, words: Mapping[str, object]) -> None:
-    """A table on stdout."""
-    table = Table(title=title, show_header=False, title_justify="left")
+def print_rows(words: Mapping[str, object]) -> None:
+    """Names and values as a table on stdout; rows without a value are left out."""
+    table = Table(title="modeshape", show_header=False, title_justify="left")
     for name, value in words.items():
         if value is not None:
             table.add_row(name, in_words(name, value))

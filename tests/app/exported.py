@@ -14,9 +14,9 @@ FRAMES = 6
 
 def exported(recording: Path, kind: str, folder: Path, **options: object) -> Path:
     out = folder / (f"out_{kind}" if kind in FOLDERS else f"out.{kind}")
-    words = export(Export(recording, format=kind, out=out, **options), Progress())  # type: ignore[arg-type]
-    assert words["out"] == str(out)
-    assert words["frames_with_shape"] == FRAMES
+    written = export(Export(recording, format=kind, out=out, **options), Progress())  # type: ignore[arg-type]
+    assert written.out == out
+    assert written.frames_with_shape == FRAMES
     assert not list(folder.glob("*.part*"))
     return out
 

@@ -24,19 +24,22 @@ def test_what_is_measured_can_be_printed(capsys: pytest.CaptureFixture[str]) -> 
     from dataclasses import asdict
 
     from app.bench.end_to_end import WholeRun
-    from app.commands.bench import print_tables
+    from app.commands.bench import Benchmarks
 
     run = WholeRun("demo", 800, 100, 2.0, 3.0, 3.5, 2.5, 10.0, 12.0, 300.0, 0.5)
-    words = {
-        "window": [asdict(window.Timing(828, 30, "general", 0.1, 0.1, 1.0, 3, 4.0))],
-        "rivals": [asdict(window.Race(828, 30, "general", 4.0, 400.0, None))],
-        "basis": [asdict(basis.BasisTime(56, "euclidean", 0.1, 0.1, 100.0, None, None))],
-        "runs": [asdict(run)],
-        "ratios": {"wall_over_bare_demo_800": 1.2},
-        "ceres": False,
-    }
-    print_tables(words)
+    measured = Benchmarks(
+        machine={},
+        quick=True,
+        window=[asdict(window.Timing(828, 30, "general", 0.1, 0.1, 1.0, 3, 4.0))],
+        rivals=[asdict(window.Race(828, 30, "general", 4.0, 400.0, None))],
+        basis=[asdict(basis.BasisTime(56, "euclidean", 0.1, 0.1, 100.0, None, None))],
+        runs=[asdict(run)],
+        ratios={"wall_over_bare_demo_800": 1.2},
+        missed=[],
+        ceres=False,
+    )
+    measured.print_table()
     printed = capsys.readouterr().out
     assert "pyceres is not installed" in printed
     assert "1.2×" in printed
-    json.dumps(words)
+    json.loads(measured.as_json())

@@ -194,8 +194,8 @@ def test_a_real_run_agrees_with_its_own_shapes(
 
 
 def words_out(recording: Path, kind: str, **options: object) -> Path:
-    words = export(Export(recording, format=kind, **options), Progress())  # type: ignore[arg-type]
-    return Path(str(words["out"]))
+    written = export(Export(recording, format=kind, **options), Progress())  # type: ignore[arg-type]
+    return written.out
 
 
 @pytest.mark.parametrize(

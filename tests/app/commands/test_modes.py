@@ -64,10 +64,10 @@ def colorful(image: NDArray[np.uint8]) -> float:
 
 def test_a_recording_shows_its_own_modes(tmp_path: Path, run: Run) -> None:
     out = tmp_path / "modes.png"
-    words = modes(Modes(run.path, out=out), Progress())
-    assert words["modes"] == MODES
-    assert words["eigenvalues"] == pytest.approx(run.basis.eigenvalues)
-    assert 0.5 < float(str(words["share"])) < 1
+    drawn = modes(Modes(run.path, out=out), Progress())
+    assert drawn.modes == MODES
+    assert drawn.eigenvalues == pytest.approx(run.basis.eigenvalues)
+    assert 0.5 < drawn.share < 1
     image = picture(out)
     assert image.shape[1] > image.shape[0] > 600
     assert 0.05 < colorful(image) < 0.6
@@ -79,7 +79,7 @@ def test_tracks_show_the_modes_of_their_rest_shape(tmp_path: Path, tracks: Path)
     found = {}
     for kind in ("first-truth", "rigid"):
         command = Modes(tracks, out=tmp_path / f"{kind}.png", rest_shape=kind, model=Model(modes=6))
-        found[kind] = modes(command, Progress())["eigenvalues"]
+        found[kind] = modes(command, Progress()).eigenvalues
     expected = modal_basis(truth[0], triangulate(truth[0, :2].T), 6, "jensen-shannon").eigenvalues
     assert found["first-truth"] == pytest.approx(expected)
     assert found["rigid"] == pytest.approx(expected, rel=0.02)
@@ -94,9 +94,9 @@ def test_the_metric_matters(tmp_path: Path, tracks: Path) -> None:
             rest_shape="first-truth",
             model=Model(modes=5, metric=metric),  # type: ignore[arg-type]
         )
-        words = modes(command, Progress())
-        assert words["metric"] == metric
-        eigenvalues.append(words["eigenvalues"])
+        drawn = modes(command, Progress())
+        assert drawn.metric == metric
+        eigenvalues.append(drawn.eigenvalues)
     assert eigenvalues[0] != pytest.approx(eigenvalues[1], rel=0.01)
 
 

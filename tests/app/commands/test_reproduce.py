@@ -8,6 +8,7 @@ import pytest
 
 from app.commands.reproduce import reproduce
 from app.options.reproduce import Reproduce
+from app.terminal.progress import Progress
 from tests.app.command_line import Command
 
 
@@ -55,11 +56,11 @@ def test_what_has_no_data_is_skipped(here: Path, modeshape: Command) -> None:
 
 @pytest.mark.slow
 def test_real_data_give_every_table(shared_data: Path, tmp_path: Path) -> None:
-    words = reproduce(
-        Reproduce(shared_data, tmp_path / "out", only=("accuracy", "mode-counts", "metrics", "missing"), quick=True)
+    reproduced = reproduce(
+        Reproduce(shared_data, tmp_path / "out", only=("accuracy", "mode-counts", "metrics", "missing"), quick=True),
+        Progress(),
     )
-    experiments = words["experiments"]
-    assert isinstance(experiments, dict)
+    experiments = reproduced.experiments
     [table, published] = experiments["accuracy"]["tables"]
     assert published["rows"][0][1] == 2.92
     for row in table["rows"]:
@@ -73,9 +74,8 @@ def test_real_data_give_every_table(shared_data: Path, tmp_path: Path) -> None:
 
 
 def test_real_data_stand_beside_peers(shared_data: Path, tmp_path: Path) -> None:
-    words = reproduce(Reproduce(shared_data, tmp_path / "out", only=("peers", "mode-shapes"), quick=True))
-    experiments = words["experiments"]
-    assert isinstance(experiments, dict)
+    reproduced = reproduce(Reproduce(shared_data, tmp_path / "out", only=("peers", "mode-shapes"), quick=True), Progress())
+    experiments = reproduced.experiments
     rows = {row[0]: row for row in experiments["peers"]["tables"][0]["rows"]}
     assert rows["PND2"][1] == 6.47
     assert rows["ours, on-line"][1] < rows["PND2"][1]
@@ -83,9 +83,8 @@ def test_real_data_stand_beside_peers(shared_data: Path, tmp_path: Path) -> None
 
 
 def test_a_video_becomes_a_strip_and_a_chart(shared_data: Path, tmp_path: Path) -> None:
-    words = reproduce(Reproduce(shared_data, tmp_path / "out", only=("paper",), quick=True))
-    experiments = words["experiments"]
-    assert isinstance(experiments, dict)
+    reproduced = reproduce(Reproduce(shared_data, tmp_path / "out", only=("paper",), quick=True), Progress())
+    experiments = reproduced.experiments
     [table] = experiments["paper"]["tables"]
     assert [row[0] for row in table["rows"]] == ["528", "not given"]
     strip = cv2.imread(str(tmp_path / "out" / "footage" / "kinect_paper.jpg"))

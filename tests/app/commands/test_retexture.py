@@ -54,8 +54,8 @@ def command(source: object, texture: Path, out: Path, **options: object) -> Rete
 def test_a_recording_is_enough(tmp_path: Path, sheet: Path, ending: str) -> None:
     texture, out = tmp_path / "red.png", tmp_path / f"new{ending}"
     cv2.imwrite(str(texture), np.full((20, 30, 3), (20, 20, 240), np.uint8))
-    words = retexture(command(sheet, texture, out), Progress())
-    assert words["frames"] == words["painted_frames"] == 6
+    painted = retexture(command(sheet, texture, out), Progress())
+    assert painted.on.frames == painted.painted_frames == 6
     frames = frames_of(out)
     assert len(frames) == 6
     assert frames[0].shape == (SIZE[1], SIZE[0], 3)
@@ -68,8 +68,8 @@ def test_a_recording_is_enough(tmp_path: Path, sheet: Path, ending: str) -> None
 def test_a_video_is_painted_while_it_is_tracked(tmp_path: Path, videos: Path, texture: Path) -> None:
     out, rrd = tmp_path / "live.mp4", tmp_path / "live.rrd"
     run = command(videos / "turning.mp4", texture, out, points=120, rrd=rrd)
-    words = retexture(run, Progress())
-    assert words["frames"] == words["painted_frames"] == 40
+    painted = retexture(run, Progress())
+    assert painted.on.frames == painted.painted_frames == 40
     live = frames_of(out)
     assert len(live) == 40
     again = tmp_path / "again.mp4"

@@ -10,10 +10,11 @@ import numpy as np
 import pyarrow.csv  # type: ignore[import-untyped]
 import pytest
 
-from app.commands.cli import run as carry_out
+from app.commands.cli import carry_out
 from app.commands.review import review
 from app.options.run import Review
-from app.playback.measures import measures, reviewed, worst_frames
+from app.playback.facts import worst_frames
+from app.playback.measures import measures, reviewed
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
@@ -84,14 +85,14 @@ def test_worst_frames_are_of_different_incidents() -> None:
 
 
 def test_table(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    review(Review(path), Progress())
+    review(Review(path), Progress()).print_table()
     table = capsys.readouterr().out
     for words in ("12 (0 to 11, 0.37 s), 12 with a shape", "bootstrap 0–1, tracking 2–11", "mean 0.707", "83.3%", "3.00%"):
         assert words in table
 
 
 def test_json_of_an_orthographic_run_is_json(orthographic: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    review(Review(orthographic, json=True), Progress())
+    assert carry_out(Review(orthographic, json=True)) == 0
 
     def refuse(constant: str) -> None:
         raise AssertionError(constant)
@@ -125,11 +126,11 @@ def test_csv_of_two_recordings_is_one_table(path: Path, without_model: Path, tmp
 
 
 def test_comparison(path: Path, without_model: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    review(Review(path, without_model, json=True), Progress())
+    assert carry_out(Review(path, without_model, json=True)) == 0
     both = json.loads(capsys.readouterr().out)["recordings"]
     assert [facts["frames"] for facts in both] == [FRAMES, 4]
     assert both[1]["reprojection_px"] is None
-    review(Review(path, without_model), Progress())
+    review(Review(path, without_model), Progress()).print_table()
     lines = [line for line in capsys.readouterr().out.splitlines() if "48, " in line]
     assert "48, 96 losses" in lines[0]
     assert "48, 32 losses" in lines[0]
