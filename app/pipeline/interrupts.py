@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM, heard only where a run can stop without loose ends."""
+"""Ctrl-C and SIGTERM, answered only where a run can stop without loose ends."""
 
 import signal
 import threading
@@ -10,26 +10,26 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 @contextmanager
 def completed() -> Iterator[None]:
-    """The body is completed before an interrupt is heard; a second one is heard at once.
+    """The body is completed before an interrupt is answered; a second one is answered at once.
 
     Raises:
         KeyboardInterrupt: one came meanwhile.
     """
-    if threading.current_thread() is not threading.main_thread():  # signals are not heard there anyway
+    if threading.current_thread() is not threading.main_thread():  # signals do not come there anyway
         yield
         return
-    heard: list[int] = []
+    received: list[int] = []
 
-    def hear(number: int, _frame: object) -> None:
-        if heard:
+    def receive(number: int, _frame: object) -> None:
+        if received:
             raise KeyboardInterrupt
-        heard.append(number)
+        received.append(number)
 
-    before = [(number, signal.signal(number, hear)) for number in SIGNALS]
+    before = [(number, signal.signal(number, receive)) for number in SIGNALS]
     try:
         yield
     finally:
         for number, handler in before:
             signal.signal(number, handler)
-    if heard:
+    if received:
         raise KeyboardInterrupt

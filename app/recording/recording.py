@@ -30,7 +30,7 @@ from reconstruction.settings import Metric
 from tracking.klt import Observation
 from tracking.video import Frame
 
-FLUSH_FRAMES = 100  # a full disk is noticed, and a killed run keeps its past, to within so many frames
+FLUSH_FRAMES = 100  # a full disk is noticed, and a killed run keeps all it wrote, to within so many frames
 NOWHERE = np.empty((0, 2))
 
 

@@ -12,7 +12,7 @@ from app.terminal.errors import UsageError
 
 PORT = 9876
 TIMEOUT_S = 1.0
-SETTLE_S = 0.5  # after which one without a screen has ended
+STARTED_S = 0.5  # after which one without a screen has ended
 START_S = 15.0  # until a viewer answers
 
 
@@ -54,7 +54,7 @@ def spawned_viewer() -> str:
             if viewer.poll() is not None or monotonic() > patience:
                 raise UsageError("--view: the viewer does not start (is there a screen?); open the file later")
             sleep(0.05)
-        sleep(SETTLE_S)
+        sleep(STARTED_S)
         if viewer.poll() is not None:
             raise UsageError("--view: the viewer does not stay (is there a screen?); open the file later")
     return f"rerun+http://127.0.0.1:{PORT}/proxy"
