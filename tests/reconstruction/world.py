@@ -74,6 +74,21 @@ def seen(shapes: Array, R: Array, camera: Camera, depth: float = 1.0) -> tuple[A
     return camera.project(placed), placed
 
 
+def views(shape: Array, R: Array, camera: Camera) -> tuple[Array, NDArray[np.bool_]]:
+    """Images (F, 2, p) px of a rigid shape (3, p) in poses R (F, 3, 3), and the visibility (F, p) of all its points."""
+    W, _ = seen(np.broadcast_to(shape, (len(R), *shape.shape)), R, camera)
+    return W, np.ones((len(R), shape.shape[1]), bool)
+
+
+def bending_sheet(camera: Camera = PERSPECTIVE, points: int = 70, frames: int = 26) -> tuple[Array, Array]:
+    """Images (F, 2, p) px of a sheet that is rolled up and flattened while it turns, and its shapes in camera axes."""
+    sheet = flat(np.random.default_rng(0), points)
+    tilt = turn((12, -8, 0))
+    shapes = np.stack([rolled(sheet, 0.009 * np.sin(np.pi * f / (frames - 1))) for f in range(frames)])
+    R = np.stack([turn((6 * np.sin(f / 5), 20 * f / frames, 3 * f / frames)) for f in range(frames)])
+    return seen(shapes, R @ tilt, camera)
+
+
 def random_rotation(rng: np.random.Generator) -> Array:
     return nearest_rotation(rng.normal(size=(3, 3)))
 

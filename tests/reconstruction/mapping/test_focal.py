@@ -30,7 +30,7 @@ def started(W: np.ndarray, assumed_px: float) -> Reconstruction:
     return reconstruction
 
 
-@pytest.mark.parametrize("share", [0.8, 1.25])
+@pytest.mark.parametrize("share", [0.8, pytest.param(1.25, marks=pytest.mark.slow)])
 def test_a_sheet_that_turns_holds_it(share: float) -> None:
     noise = np.random.default_rng(1).normal(0, 0.1, (FRAMES, 2, 60))
     reconstruction = started(sheet(PERSPECTIVE) + noise, share * PERSPECTIVE.focal_px)

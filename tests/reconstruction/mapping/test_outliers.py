@@ -6,7 +6,6 @@ from hypothesis import given, settings
 
 from reconstruction.evaluation import with_missing, with_outliers
 from reconstruction.mapping.outliers import medians, without_outliers
-from reconstruction.window.robust import off_the_common_motion
 from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, Camera, flat, relief, rolled, seen, turns
 
 FRAMES, POINTS = 12, 60
@@ -84,21 +83,6 @@ def test_points_never_seen_are_no_obstacle() -> None:
     sound = without_outliers(np.where(visible[:, None], W, np.nan), visible)
     assert not sound[3, 9]
     assert sound.sum() == visible.sum() - 1
-
-
-@settings(max_examples=20)
-@given(SEEDS)
-def test_one_frames_outliers_stand_out_from_a_fast_motion(rng: np.random.Generator) -> None:
-    shape = relief(rng, POINTS)
-    W = (turns(FRAMES)[3] @ shape)[:2] + 80
-    visible = rng.random(POINTS) < 0.9
-    gross = np.flatnonzero(visible)[::4]
-    wild = W.copy()
-    wild[:, gross] += 100 * np.where(rng.random((2, len(gross))) < 0.5, -1, 1)
-    off = np.linalg.norm(off_the_common_motion(shape, np.where(visible, wild, np.nan), visible, 7.0), axis=0)
-    assert off[gross].min() > 60
-    assert np.delete(off, gross).max() < 6
-    assert (off[~visible] == 0).all()
 
 
 @given(SEEDS)

@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from reconstruction import ReconstructionError
-from reconstruction.basis.rest_shape import given as given_shape
 from reconstruction.camera import Camera
 from reconstruction.mapping import rest_shape
-from reconstruction.mapping.evidence import apparent_change, foreshortening_degrees, judging_points, weigh
+from reconstruction.mapping.evidence import weigh
 from reconstruction.mapping.factorization import view_turn_degrees
 from reconstruction.mapping.rest_shape import first_image
 from reconstruction.mapping.sheet import sheet
@@ -25,14 +23,10 @@ from tests.reconstruction.world import (
     shape_error,
     turn,
     turns,
+    views,
 )
 
 FRAMES, POINTS = 15, 60
-
-
-def views(shape: np.ndarray, R: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
-    W, _ = seen(np.broadcast_to(shape, (len(R), *shape.shape)), R, camera)
-    return W, np.ones((len(R), shape.shape[1]), bool)
 
 
 @settings(max_examples=8)
@@ -97,32 +91,6 @@ def test_a_still_object_has_no_shape_and_the_error_says_how_much_it_turned() -> 
         rest_shape.rigid(W + rng.normal(0, 0.05, W.shape), visible, PERSPECTIVE)
 
 
-@pytest.mark.parametrize(("degrees", "trusted"), [(0.0, False), (2.0, False), (25.0, True)])
-def test_evidence_for_a_rigid_shape_grows_with_the_turn(degrees: float, trusted: bool) -> None:
-    rng = np.random.default_rng(1)
-    W, visible = views(relief(rng, POINTS), turns(FRAMES, degrees), ORTHOGRAPHIC)
-    evidence = weigh(W + rng.normal(0, 0.1, W.shape), visible)
-    assert (evidence.doubt == "") == trusted, evidence.doubt
-    if degrees == 0.0:
-        assert evidence.turn_degrees < 10
-        assert "turned" in evidence.doubt
-        assert "10° are needed" in evidence.doubt
-
-
-def test_a_flat_sheet_is_not_taken_for_a_solid() -> None:
-    rng = np.random.default_rng(2)
-    W, visible = views(flat(rng, POINTS), turns(FRAMES), ORTHOGRAPHIC)
-    assert weigh(W + rng.normal(0, 0.2, W.shape), visible).doubt
-
-
-def test_a_deforming_sheet_is_not_taken_for_a_solid() -> None:
-    rng = np.random.default_rng(3)
-    sheet = flat(rng, POINTS)
-    shapes = np.stack([rolled(sheet, 0.012 * np.sin(f / 2)) for f in range(FRAMES)])
-    W, _ = seen(shapes, turns(FRAMES, 8.0), ORTHOGRAPHIC)
-    assert weigh(W, np.ones((FRAMES, POINTS), bool)).doubt
-
-
 @pytest.mark.parametrize("axis", [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0.7, 0.7, 0)])
 def test_tilt_of_a_turning_sheet_is_recovered_under_perspective(axis: tuple[float, float, float]) -> None:
     rng = np.random.default_rng(4)
@@ -183,15 +151,6 @@ def test_a_sheet_in_a_given_plane_looks_like_the_image(rng: np.random.Generator,
     assert np.abs(difference - difference.mean(axis=1, keepdims=True)).max() < 1.0  # the centroid moves under perspective
 
 
-@given(SEEDS, st.sampled_from([flat, relief]))
-def test_given_shapes_are_centred_and_known_to_be_flat_or_not(rng: np.random.Generator, surface) -> None:  # type: ignore[no-untyped-def]
-    shape = turn((20, 30, 10)) @ surface(rng, POINTS)
-    found = given_shape(shape + 100.0, "mesh", "a note")
-    np.testing.assert_allclose(found.motion.shape, shape, atol=1e-9)
-    assert found.flat == (surface is flat)
-    assert (found.kind, found.note) == ("mesh", "a note")
-
-
 @settings(max_examples=10)
 @given(rng=SEEDS)
 def test_points_hidden_in_the_first_frame_are_put_where_the_others_say(rng: np.random.Generator) -> None:
@@ -212,33 +171,6 @@ def test_a_point_never_seen_gets_a_place_too() -> None:
     found = first_image(np.where(visible[:, None], W, np.nan), visible)
     assert np.isfinite(found).all()
     np.testing.assert_array_equal(found[:, 4], W[6, :, 4])
-
-
-@given(SEEDS)
-def test_similarities_are_no_apparent_change(rng: np.random.Generator) -> None:
-    shape = relief(rng, POINTS)
-    W = np.stack([(1 + 0.1 * f) * (turn((0, 0, 10 * f)) @ shape)[:2] + 3 * f for f in range(5)])
-    visible = np.ones((5, POINTS), bool)
-    assert apparent_change(W, visible) < 1e-3
-    assert foreshortening_degrees(W, visible) < 0.5
-    bent = W.copy()
-    bent[3] += 4 * rng.normal(size=bent[3].shape)
-    assert apparent_change(bent, visible) > 2
-
-
-def test_foreshortening_of_a_sheet_is_its_turn() -> None:
-    W, visible = views(flat(np.random.default_rng(0), POINTS), np.stack([np.eye(3), turn((0, 40, 0))]), ORTHOGRAPHIC)
-    assert foreshortening_degrees(W, visible) == pytest.approx(40, abs=0.5)
-
-
-def test_judging_points_are_well_spread_and_often_seen() -> None:
-    rng = np.random.default_rng(0)
-    W = rng.uniform(0, 500, (10, 2, 600))
-    visible = np.ones((10, 600), bool)
-    visible[3:, 300:] = False
-    chosen = judging_points(W, visible)
-    assert len(set(chosen.tolist())) == len(chosen)
-    assert chosen.max() < 300
 
 
 def test_a_sheet_that_bends_later_is_judged_by_its_flat_frames() -> None:

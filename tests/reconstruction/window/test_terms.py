@@ -14,7 +14,6 @@ from reconstruction.state import POSE, State, join
 from reconstruction.window import statistics
 from reconstruction.window.energy import Energy
 from reconstruction.window.marginal import Previous
-from reconstruction.window.smoothness import quaternion_difference, smoothness
 from reconstruction.window.statistics import Statistics
 from reconstruction.window.terms import HAT, evaluate, linearise
 from tests.reconstruction.world import (
@@ -25,7 +24,6 @@ from tests.reconstruction.world import (
     random_state,
     relief,
     statistics_of,
-    unit_quaternions,
 )
 
 FRAMES, MODES, POINTS = 3, 3, 25
@@ -259,38 +257,6 @@ def test_an_untied_window_floats() -> None:
 
 
 @given(SEEDS)
-def test_opposite_quaternions_are_the_same_pose(rng: np.random.Generator) -> None:
-    state = random_state(rng, 2, 2)
-    flipped = replace(state, q=state.q * [[1.0], [-1.0]])
-    np.testing.assert_allclose(flipped.matrices(), state.matrices())
-    energy = Energy()
-    np.testing.assert_allclose(
-        smoothness(energy, flipped[:1], flipped[1:]), smoothness(energy, state[:1], state[1:]), atol=1e-14
-    )
-    (q,) = unit_quaternions(rng, 1)
-    np.testing.assert_array_equal(quaternion_difference(q[None], -q[None]), np.zeros((1, 4)))
-
-
-@given(SEEDS, ROWS)
-def test_steps_move_only_the_free_rows(rng: np.random.Generator, rows: tuple[int, ...]) -> None:
-    state = random_state(rng, 2, 3)
-    step = rng.normal(size=(2, POSE + 3 * len(rows)))
-    moved = state.moved(step, rows)
-    fixed = [row for row in range(3) if row not in rows]
-    np.testing.assert_array_equal(moved.Lambda[:, fixed], state.Lambda[:, fixed])
-    np.testing.assert_allclose((moved.Lambda - state.Lambda)[:, rows].reshape(2, -1), step[:, POSE:])
-    np.testing.assert_allclose(np.linalg.norm(moved.q, axis=1), 1.0)
-    np.testing.assert_allclose(state.moved(np.zeros_like(step), rows).matrices(), state.matrices())
-
-
-@given(SEEDS)
 def test_hat_is_the_cross_product(rng: np.random.Generator) -> None:
     a, b = rng.normal(size=(2, 3))
     np.testing.assert_allclose(np.tensordot(a, HAT, 1) @ b, np.cross(a, b))
-
-
-def test_joined_states_can_be_taken_apart() -> None:
-    state = random_state(np.random.default_rng(2), 4, 2)
-    again = join([state[:1], state[1:]])
-    assert len(again) == 4
-    np.testing.assert_array_equal(again.matrices(), state.matrices())
