@@ -11,16 +11,14 @@ import pytest
 from numpy.typing import NDArray
 
 from app.commands.retexture import first_frame, is_recording, retexture
-from app.files.video_out import PacedVideo, VideoSink
 from app.options.retexture import Retexture
 from app.options.run import Output, Run
-from app.painting.picture import Texture
 from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from tests.app.card import card
-from tests.app.command_line import Command, in_own_process
+from tests.app.command_line import Command
 from tests.synthetic_run import SIZE, picture, write_run
 from tracking.video import Video
 
@@ -110,44 +108,6 @@ def test_run_with_a_texture_paints_the_recording(tmp_path: Path, videos: Path, t
     assert np.abs(first[y : y + h, x : x + w].astype(int) - before).mean() < 4  # the frame itself stays what it was
 
 
-def test_a_video_moves_on_the_surface_and_begins_again(tmp_path: Path) -> None:
-    path = tmp_path / "moving.mp4"
-    with VideoSink(path, (64, 48), 10.0) as sink:
-        for level in (40, 90, 140, 190):
-            sink.write(np.full((48, 64, 3), level, np.uint8))
-    with Texture(path) as texture:
-        shown = [texture.at(t)[..., :3].copy() for t in (0.0, 0.05, 0.1, 0.25, 0.39, 0.4, 0.75, 0.81, 4.35)]
-    frames = frames_of(path)  # as compressed: the grey levels are off by a few
-    assert len(frames) == 4
-    for picture_, k in zip(shown, (0, 0, 1, 2, 3, 0, 3, 0, 3), strict=True):
-        assert np.array_equal(picture_, frames[k])
-
-
-def test_frames_of_uneven_times_keep_them(tmp_path: Path) -> None:
-    path = tmp_path / "uneven.mp4"
-    with VideoSink(path, (64, 48), 10.0) as sink:
-        paced = PacedVideo(sink, 10.0)
-        for level, time_s in ((40, 5.0), (90, 5.1), (140, 5.4), (150, 5.41), (190, 5.5)):
-            paced.write(np.full((48, 64, 3), level, np.uint8), time_s)
-        paced.end()
-    levels = [float(frame.mean()) for frame in frames_of(path)]
-    assert np.abs(np.array(levels) - (40, 90, 90, 90, 150, 190)).max() < 4
-
-
-def test_the_picture_s_own_size_and_alpha_are_read(tmp_path: Path) -> None:
-    for name, picture_ in (
-        ("grey", np.full((9, 7), 100, np.uint8)),
-        ("deep", np.full((9, 7, 3), 100 * 257, np.uint16)),
-        ("clear", np.dstack([np.full((9, 7, 3), 200, np.uint8), np.full((9, 7), 128, np.uint8)])),
-    ):
-        cv2.imwrite(str(tmp_path / f"{name}.png"), picture_)
-        with Texture(tmp_path / f"{name}.png") as texture:
-            read = texture.at(0.0)
-        assert read.shape == (9, 7, 4)
-        assert np.abs(read[..., 0].astype(int) - 100).max() <= 1
-        assert read[0, 0, 3] == (128 if name == "clear" else 255)
-
-
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
@@ -211,12 +171,6 @@ def test_the_command_line(modeshape: Command, here: Path, sheet: Path, texture: 
     assert (here / "new.mp4").stat().st_size > 0
     done = modeshape("retexture", sheet, "--texture", texture, "--out", "new.mp4")
     assert (done.code, done.err.count("\n")) == (2, 1)
-
-
-def test_help_is_there_at_once(tmp_path: Path) -> None:
-    done = in_own_process(tmp_path, "retexture", "--help")
-    assert done.code == 0
-    assert "--place" in done.out
 
 
 @pytest.mark.parametrize(

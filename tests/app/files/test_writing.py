@@ -1,0 +1,44 @@
+"""Files appear only when complete, and nothing is replaced unasked."""
+
+from pathlib import Path
+
+import pytest
+
+from app.files.writing import check_free, writable
+from app.terminal.errors import UsageError
+
+
+def test_a_file_appears_when_it_is_complete(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    with writable(path) as file:
+        file.write(b"1,2\n")
+        assert not path.exists()
+    assert path.read_bytes() == b"1,2\n"
+
+
+def test_what_fails_leaves_the_file_of_before(tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    path.write_text("before")
+
+    def fail() -> None:
+        with writable(path) as file:
+            file.write(b"1,2\n")
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(UsageError, match=r"cannot write .*table\.csv: No space left"):
+        fail()
+    assert [(each.name, each.read_text()) for each in tmp_path.iterdir()] == [("table.csv", "before")]
+
+
+def test_a_place_is_seen_to_before_the_work(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "table.csv"
+    check_free(None, overwrite=False)
+    check_free(path, overwrite=False)
+    assert list(path.parent.iterdir()) == []
+    path.write_text("somebody's work")
+    with pytest.raises(UsageError, match=r"table\.csv exists: replace it with --overwrite"):
+        check_free(path, overwrite=False)
+    check_free(path, overwrite=True)
+    assert path.read_text() == "somebody's work"
+    with pytest.raises(UsageError, match="cannot write"):
+        check_free(path / "table.csv", overwrite=False)
