@@ -10,16 +10,14 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array, Indices
 from app.files.writing import check_free, writable
 from app.options.export import Export
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary
-
-Array = NDArray[np.float64]
 
 FOLDERS = ("obj", "ply", "csv")  # formats with more than one file
 VIDEOS = ("mp4", "webm")
@@ -65,7 +63,7 @@ def export(command: Export, progress: Progress) -> Exported:
     playback = Playback.load(command.recording)
     for note in playback.notes:
         progress.say(note)
-    playback.need_model()
+    _ = playback.model  # a UsageError if there is none
     if not playback.shaped.any():
         raise UsageError(f"{playback.path} contains no shape: run again for longer")
     if kind not in FOLDERS:
@@ -164,7 +162,7 @@ def write_video(playback: Playback, out: Path, advance: Callable[[], None]) -> N
             advance()
 
 
-def steady(times_s: Array) -> tuple[float, NDArray[np.int64]]:
+def steady(times_s: Array) -> tuple[float, Indices]:
     """Frames per second of a video, and how many times each frame (F,) is shown so that it keeps its time there."""
     steps = np.diff(times_s)
     if not (steps > 0).any():

@@ -188,7 +188,7 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Played:
     for option in (name for name, value in live.items() if value is not None):
         raise UsageError(f"{option} is for videos, not for the recording {command.source}: leave it out")
     playback = Playback.load(Path(command.source))
-    model = playback.need_model()
+    model = playback.model
     for note in playback.notes:
         progress.say(note)
     first, stop = parse_range(command.frames)

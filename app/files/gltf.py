@@ -22,17 +22,14 @@ import numpy as np
 import pygltflib as gltf
 from numpy.typing import NDArray
 
+from app.arrays import Array, Indices
 from app.files.gltf_buffer import Buffer
-from reconstruction.basis.modes import ModalBasis
+from reconstruction.basis.modes import ROW_NAMES, ModalBasis
 from reconstruction.camera import rotation_from_quaternion
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 JPEG_QUALITY = 95
 LENGTH_M = 1.0  # of the rest shape along its first axis
 HALF_TURN_ABOUT_X = [1.0, 0.0, 0.0, 0.0]  # quaternion, w last as in glTF
-ROWS = ("alpha", "beta", "tau")
 
 
 @dataclass(frozen=True)
@@ -131,7 +128,7 @@ def morph_targets(moving: MovingMesh) -> tuple[Array, Array, list[str], list[flo
     free = np.flatnonzero(units > 0)
     r = moving.Lambda.shape[2]
     targets = moving.basis.linear_basis()[free].transpose(0, 2, 1) * units[free, None, None]
-    names = [f"{ROWS[i // r]} {i % r + 1}" for i in free.tolist()]
+    names = [f"{ROW_NAMES[i // r]} {i % r + 1}" for i in free.tolist()]
     return phi[:, free] / units[free], targets, names, units[free].tolist()
 
 

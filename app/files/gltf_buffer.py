@@ -1,11 +1,8 @@
 """The binary part of a glTF file."""
 
-import numpy as np
 import pygltflib as gltf
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from app.arrays import Array, Indices
 
 LARGEST_SHORT_INDEX = 65534  # 65535 is reserved
 

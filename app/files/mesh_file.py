@@ -4,16 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
+from app.arrays import Array, Flags
 from app.terminal.errors import UsageError
 from reconstruction import ReconstructionError
 from reconstruction.basis import rest_shape
 from reconstruction.basis.mesh import Mesh, locate, mesh_from_faces
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
-
-Array = NDArray[np.float64]
 
 LEAST_COVERED = 12  # corners inside the mesh that a run needs
 
@@ -53,7 +51,7 @@ def rest_of_vertices(path: Path, points: int) -> tuple[RestShape, Mesh]:
     return rest_shape.given(vertices.T, "mesh", f"mesh {path.name}"), mesh
 
 
-def rest_of_surface(path: Path, points_px: Array, camera: Camera) -> tuple[RestShape, NDArray[np.bool_]]:
+def rest_of_surface(path: Path, points_px: Array, camera: Camera) -> tuple[RestShape, Flags]:
     """The corners (n, 2) px lifted onto a mesh over the first frame: x, y in its pixels, z the relative depth in pixels.
 
     Returns:

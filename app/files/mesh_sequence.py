@@ -4,10 +4,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from app.arrays import Array, Indices
 
 TEXTURE = "texture.png"
 MATERIALS = "surface.mtl"

@@ -10,12 +10,9 @@ from types import TracebackType
 from typing import Self
 
 import cv2
-import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Image
 from app.terminal.errors import UsageError
-
-Image = NDArray[np.uint8]
 
 CODECS = {".mp4": "mp4v", ".webm": "VP80"}
 CHECKED_FRAMES = 30  # between two looks at the disk

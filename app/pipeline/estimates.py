@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array
 from app.files.writing import writable
 from app.terminal.summary import Summary
 from reconstruction.basis.mesh import Mesh
@@ -15,8 +15,6 @@ from reconstruction.basis.model import Model
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import Score, followed, score
 from tracking.tracks import Truth
-
-Array = NDArray[np.float64]
 
 
 @dataclass

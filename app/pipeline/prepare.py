@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.arrays import Array
 from app.files.mesh_file import rest_of_surface
 from app.options.model import Model
 from app.options.run import Run
@@ -17,8 +18,6 @@ from reconstruction.settings import RecoveredRestShape, Settings
 from tracking.features import detect_corners
 from tracking.region import region_mask
 from tracking.video import Frame
-
-Array = NDArray[np.float64]
 
 RECOVERED = get_args(RecoveredRestShape)  # rest shapes that come from the first frames
 

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
 
-STAGES = ("decode", "track", "reconstruct", "record")
+from app.recording.entities import STAGES
 
 
 @dataclass

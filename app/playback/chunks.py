@@ -92,7 +92,7 @@ class RecordingFile:
         try:
             self._open(path)
         except RuntimeError:
-            self._rescue()
+            self._open_complete_part()
 
     def __iter__(self) -> Iterator[Chunk]:
         try:
@@ -116,9 +116,9 @@ class RecordingFile:
             warnings.simplefilter("ignore")  # a killed run has no footer, and can be read all the same
             self._reader = RrdReader(path)
             stores = self._reader.recordings()
-        self._store = self._ours(stores)
+        self._store = self._find_store(stores)
 
-    def _ours(self, stores: list[StoreEntry]) -> StoreEntry:
+    def _find_store(self, stores: list[StoreEntry]) -> StoreEntry:
         for store in stores:
             if store.application_id == entities.APPLICATION:
                 return store
@@ -129,7 +129,7 @@ class RecordingFile:
             "give an .rrd file that `modeshape run` wrote"
         )
 
-    def _rescue(self) -> None:
+    def _open_complete_part(self) -> None:
         """Read the complete messages of a file that ends in the middle of one, from a copy."""
         self._part = NamedTemporaryFile(suffix=".rrd")  # noqa: SIM115 (goes when this object goes)
         try:

@@ -28,15 +28,15 @@ def show(reviewed: list[Reviewed], url: str) -> None:
         for one, side in zip(reviewed, SIDES, strict=False):
             for chunk in one.playback.file:
                 if not chunk.entity_path.startswith("/__"):  # properties, as the name
-                    rr.send_chunks(moved(chunk, side) if two else chunk, recording=stream)
+                    rr.send_chunks(below(side, chunk) if two else chunk, recording=stream)
             if two:
-                tell_apart(stream, one, side)
+                name_curves(stream, one, side)
         stream.flush()
     finally:
         stream.disconnect()
 
 
-def tell_apart(stream: rr.RecordingStream, one: Reviewed, side: str) -> None:
+def name_curves(stream: rr.RecordingStream, one: Reviewed, side: str) -> None:
     """Name the curves after their recording, in its colours."""
     strong, pale = COLORS[one.place]
     curves = [(entities.ERROR, ["RMS", "median"], [pale, strong]), (entities.VISIBLE, ["seen"], [strong])]
@@ -46,7 +46,7 @@ def tell_apart(stream: rr.RecordingStream, one: Reviewed, side: str) -> None:
         stream.log(f"{side}/{entity}", lines, static=True)
 
 
-def moved(chunk: Chunk, side: str) -> Chunk:
+def below(side: str, chunk: Chunk) -> Chunk:
     """A chunk below an entity."""
     return chunk.with_entity_path(f"/{side}/{chunk.entity_path.strip('/')}".rstrip("/"))
 

@@ -1,4 +1,4 @@
-"""The words of a recording: documents, events, and names."""
+"""Documents, events and names in a recording."""
 
 import json
 from typing import cast
@@ -9,7 +9,6 @@ from app.recording import entities
 DOCUMENT = "modeshape.Document:"
 NAME = ("__properties", "RecordingInfo:name")
 SCALARS = "Scalars:scalars"
-STAGES = ("decode", "track", "reconstruct", "record")  # in this order, before any others
 
 
 def document(rows: Rows, entity: str) -> tuple[dict[str, object] | None, str]:
@@ -37,6 +36,7 @@ def recording_name(rows: Rows) -> str | None:
 
 
 def stages(rows: Rows) -> list[str]:
-    """Names of the stages whose time was taken."""
+    """Names of the stages with recorded times: first those that every run has."""
+    order = entities.STAGES
     found = [e.split("/", 1)[1] for e, c in rows.found if e.startswith(f"{entities.TIMING}/") and c == SCALARS]
-    return sorted(found, key=lambda stage: STAGES.index(stage) if stage in STAGES else len(STAGES))
+    return sorted(found, key=lambda stage: order.index(stage) if stage in order else len(order))

@@ -86,11 +86,11 @@ def facts(playback: Playback, measured: Measures) -> Facts:
         frames_with_shape=int(playback.shaped.sum()),
         phases=[{"phase": name, "first": a, "last": b} for name, a, b in phase_ranges(playback)],
         rest_shape=summary.get("rest_shape", configuration.get("rest_shape")),
-        rest_shape_note=summary.get("rest_shape_note", infos[0] if infos and playback.modelled else None),
+        rest_shape_note=summary.get("rest_shape_note", infos[0] if infos and playback.recorded_model else None),
         deformation=summary.get("deformation", configuration.get("deformation")),
         points=playback.visible.shape[1],
         metric=summary.get("metric", configuration.get("metric")),
-        modes=playback.Lambda.shape[2] if playback.modelled else configuration.get("modes"),
+        modes=playback.Lambda.shape[2] if playback.recorded_model else configuration.get("modes"),
         visible_share={
             "mean": float(measured.visible_share.mean()),
             "min": float(measured.visible_share.min()),

@@ -8,9 +8,9 @@ import numpy as np
 
 from app.arrays import Array, Indices
 from app.playback.playback import Playback
+from reconstruction.basis.modes import ROW_NAMES
 
 PARAMETERS = ("qw", "qx", "qy", "qz", "tx_px", "ty_px", "s")
-ROWS = ("alpha", "beta", "tau")
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def by_frame(residual_px: Array, measure: Callable[[Array], float]) -> Array:
 def measures(playback: Playback) -> Measures:
     """Measures of a recording; those of shapes are NaN if it contains none."""
     residual_px = np.full(playback.visible.shape, np.nan)
-    if playback.modelled is not None:
+    if playback.recorded_model is not None:
         for i in np.flatnonzero(playback.shaped):
             estimate = playback.estimate(int(i))
             assert estimate is not None
@@ -101,7 +101,7 @@ def per_frame(one: Reviewed) -> dict[str, list[object]]:
         **{f"error_{name}_px": measured.errors(q) for name, q in (("median", 50), ("p95", 95), ("max", 100))},
         **{f"{stage}_ms": values for stage, values in playback.stage_ms.items()},
         **dict(zip(PARAMETERS, (*playback.quaternion.T, *playback.t.T, playback.s), strict=True)),
-        **{f"Lambda_{row}_px": np.linalg.norm(playback.Lambda[:, k], axis=1) for k, row in enumerate(ROWS)},
+        **{f"Lambda_{row}_px": np.linalg.norm(playback.Lambda[:, k], axis=1) for k, row in enumerate(ROW_NAMES)},
     }
     return {
         "recording": [one.label] * len(playback.frames),

@@ -18,8 +18,8 @@ TEXTURE = "Mesh3D:albedo_texture_"
 
 
 @dataclass(frozen=True)
-class Modelled:
-    """The part of a recording that is there once the bootstrap is over.
+class RecordedModel:
+    """The model of a recording with its texture; there once the rest shape is found.
 
     Attributes:
         model: rest shape, modes, mesh and camera.
@@ -36,7 +36,7 @@ class Modelled:
     texture_origin: Indices
 
 
-def modelled_part(rows: Rows) -> Modelled | None:
+def read_model(rows: Rows) -> RecordedModel | None:
     """Model and texture, or None if the recording does not have both."""
     if not rows.last(entities.MODEL, f"{MODEL}rest") or not rows.last(entities.MESH, f"{TEXTURE}buffer"):
         return None
@@ -51,7 +51,7 @@ def modelled_part(rows: Rows) -> Modelled | None:
     layout = cast(list[dict[str, int]], rows.static(entities.MESH, f"{TEXTURE}format"))[0]
     rgb = np.frombuffer(cast(bytes, rows.static(entities.MESH, f"{TEXTURE}buffer")), np.uint8)
     width, height = value("size").astype(int).tolist()
-    return Modelled(
+    return RecordedModel(
         model=Model(basis, Mesh(faces, edges), camera),
         size=(width, height),
         texture_px=value("texture_px").reshape(-1, 2),

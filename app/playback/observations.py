@@ -14,7 +14,7 @@ POSITIONS = "Points2D:positions"
 
 
 @dataclass(frozen=True)
-class Observed:
+class Observations:
     """The part of a recording that every frame has; F frames, P points.
 
     Attributes:
@@ -32,7 +32,7 @@ class Observed:
     visible: Flags
 
 
-def observed_part(rows: Rows) -> Observed | None:
+def read_observations(rows: Rows) -> Observations | None:
     """Frames and observations, or None if there is not a single frame.
 
     Raises:
@@ -50,7 +50,7 @@ def observed_part(rows: Rows) -> Observed | None:
     if len(positions) != visible.sum():
         raise ValueError("the points and their visibility disagree")
     points[visible] = positions
-    return Observed(
+    return Observations(
         frames=np.array(numbers, np.int64),
         times_s=np.array([observed[k].time_s for k in numbers]),
         phases=[cast(list[str], phases[k].value)[0] for k in numbers],

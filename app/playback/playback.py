@@ -15,8 +15,8 @@ from app.arrays import Array, Flags, Image, Indices
 from app.playback.chunks import RecordingFile
 from app.playback.documents import DOCUMENT, NAME, SCALARS, document, events, recording_name, stages
 from app.playback.images import stored_images
-from app.playback.model import MODEL, TEXTURE, Modelled, modelled_part
-from app.playback.observations import OBSERVATION, POSITIONS, observed_part
+from app.playback.model import MODEL, TEXTURE, RecordedModel, read_model
+from app.playback.observations import OBSERVATION, POSITIONS, read_observations
 from app.recording import entities
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
@@ -39,7 +39,7 @@ class Playback:
         version: of the modeshape that wrote it.
         configuration: what the run was asked to do.
         summary: what came out of the run; None if it was cut off.
-        notes: what is missing in the recording, in words for a person; usually none.
+        notes: what is missing in the recording; usually none.
         frames: (F,) numbers of the frames in their source.
         times_s: (F,) their times.
         phases: (F) phase of the run at each.
@@ -51,7 +51,7 @@ class Playback:
         t: (F, 2) px.
         s: (F,).
         Lambda: (F, 3, r) px; r = 0 without a model.
-        modelled: what is known once the bootstrap is over; None if the run ended before.
+        recorded_model: model and texture; None if the run ended before its rest shape was found.
     """
 
     path: Path
@@ -71,7 +71,7 @@ class Playback:
     t: Array
     s: Array
     Lambda: Array
-    modelled: Modelled | None
+    recorded_model: RecordedModel | None
     file: RecordingFile
 
     @classmethod
@@ -94,11 +94,11 @@ class Playback:
     @classmethod
     def _of(cls, file: RecordingFile) -> Self:
         rows = file.rows(wanted)
-        observed = observed_part(rows)
+        observed = read_observations(rows)
         if observed is None:
             raise UsageError(f"{file.path} contains no frame: the run ended before its first, or its start was lost")
-        modelled = modelled_part(rows)
-        modes = len(modelled.model.basis.eigenvalues) if modelled else 0
+        recorded_model = read_model(rows)
+        modes = len(recorded_model.model.basis.eigenvalues) if recorded_model else 0
         numbers = observed.frames.tolist()
 
         def by_frame(entity: str, component: str, width: int) -> Array:
@@ -115,7 +115,7 @@ class Playback:
             notes.append(f"{file.path} is cut off: {len(numbers)} frames, up to number {numbers[-1]}, could be read")
         elif summary is None:
             notes.append(f"{file.path} is of a run that was ended before it was complete: it has no summary")
-        if modelled is None:
+        if recorded_model is None:
             notes.append(f"{file.path} contains no shapes: the run ended before its rest shape was found")
         return cls(
             path=file.path,
@@ -135,52 +135,49 @@ class Playback:
             t=by_frame(entities.ESTIMATE, f"{ESTIMATE}t", 2),
             s=by_frame(entities.ESTIMATE, f"{ESTIMATE}s", 1)[:, 0],
             Lambda=by_frame(entities.ESTIMATE, f"{ESTIMATE}Lambda", 3 * modes).reshape(len(numbers), 3, modes),
-            modelled=modelled,
+            recorded_model=recorded_model,
             file=file,
         )
 
-    def need_model(self) -> Model:
-        """Rest shape, modes, mesh and camera together.
-
-        Raises:
-            UsageError: the run ended before there was a model.
-        """
-        return self._need().model
+    @property
+    def model(self) -> Model:
+        """Rest shape, modes, mesh and camera; like the following, a UsageError if the run had found none."""
+        return self._known_model.model
 
     @property
     def basis(self) -> ModalBasis:
-        """Rest shape and modes; this and the following raise UsageError if the run ended before there was a model."""
-        return self._need().model.basis
+        """Rest shape and modes."""
+        return self.model.basis
 
     @property
     def mesh(self) -> Mesh:
         """Connectivity of the points."""
-        return self._need().model.mesh
+        return self.model.mesh
 
     @property
     def camera(self) -> Camera:
         """The camera."""
-        return self._need().model.camera
+        return self.model.camera
 
     @property
     def size(self) -> tuple[int, int]:
         """(width, height) of the picture, px."""
-        return self._need().size
+        return self._known_model.size
 
     @property
     def texture_px(self) -> Array:
         """The vertices (P, 2) px in the first frame."""
-        return self._need().texture_px
+        return self._known_model.texture_px
 
     @property
     def texture_bgr(self) -> Image:
         """The part (h, w, 3) of the first frame that the vertices cover."""
-        return self._need().texture_bgr
+        return self._known_model.texture_bgr
 
     @property
     def texture_origin(self) -> Indices:
         """Where (2,) px that part is in the first frame."""
-        return self._need().texture_origin
+        return self._known_model.texture_origin
 
     @cached_property
     def shaped(self) -> Flags:
@@ -193,7 +190,7 @@ class Playback:
         Raises:
             UsageError: the run ended before there was a model.
         """
-        model = self.need_model()
+        model = self.model
         if not self.shaped[i]:
             return None
         q = quaternion_from_rotation(rotation_from_quaternion(self.quaternion[i]) @ model.basis.Phi)
@@ -218,13 +215,14 @@ class Playback:
         """Row and picture (H, W, 3) BGR of every frame, decoded one at a time; None where there is none."""
         return stored_images(self.file, self.frames.tolist())
 
-    def _need(self) -> Modelled:
-        if self.modelled is None:
+    @property
+    def _known_model(self) -> RecordedModel:
+        if self.recorded_model is None:
             raise UsageError(
                 f"{self.path} contains no model: the run ended before its rest shape was found; "
                 "run again for longer, or with --rest-shape plane"
             )
-        return self.modelled
+        return self.recorded_model
 
 
 def wanted(entity: str, component: str) -> bool:

@@ -43,7 +43,7 @@ def write_review(file: BinaryIO, suffix: str, reviewed: list[Reviewed]) -> None:
 
 def review_figure(reviewed: list[Reviewed]) -> Figure:
     """Error, share of the points seen, Λ and time over the frames, one below the other; at the right what has no frame."""
-    shaped = [one for one in reviewed if one.playback.modelled is not None and one.playback.shaped.any()]
+    shaped = [one for one in reviewed if one.playback.recorded_model is not None and one.playback.shaped.any()]
     maps = 3 * len(shaped)
     heights = [1.7, 1.0, *[0.95] * maps, 1.5]
     figure = Figure(figsize=(WIDTH_INCHES, 1.25 * sum(heights) + 0.3), layout="constrained")

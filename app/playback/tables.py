@@ -9,9 +9,8 @@ import numpy as np
 
 from app.arrays import Array, Indices
 from app.playback.playback import Playback
+from reconstruction.basis.modes import ROW_NAMES
 from reconstruction.camera import rotation_from_quaternion
-
-ROWS = ("alpha", "beta", "tau")
 
 
 def camera_path(playback: Playback, rows: Indices) -> tuple[Array, Array]:
@@ -85,11 +84,11 @@ def write_csv(playback: Playback, folder: Path, advance: Callable[[], None]) -> 
     _, positions = camera_path(playback, shaped)
     position = dict(zip(shaped.tolist(), positions, strict=True))
     modes = playback.Lambda.shape[2]
-    names = [f"{row}_{k}" for row in ROWS for k in range(1, modes + 1)]
+    names = [f"{row}_{k}" for row in ROW_NAMES for k in range(1, modes + 1)]
     times = [(int(frame), round(float(time), 6)) for frame, time in zip(playback.frames, playback.times_s, strict=True)]
 
     pose = ["qw", "qx", "qy", "qz", "tx", "ty", "s"]
-    seat = ["camera_x", "camera_y", "camera_z", "camera_qw", "camera_qx", "camera_qy", "camera_qz"]
+    camera_columns = ["camera_x", "camera_y", "camera_z", "camera_qw", "camera_qx", "camera_qy", "camera_qz"]
 
     def pose_row(i: int) -> list[object]:
         q = playback.quaternion[i]
@@ -98,7 +97,7 @@ def write_csv(playback: Playback, folder: Path, advance: Callable[[], None]) -> 
         return [*times[i], playback.phases[i], *cells(values)]
 
     frames = range(len(times))
-    table(folder / "frames.csv", ["frame", "time_s", "phase", *pose, *seat], map(pose_row, frames))
+    table(folder / "frames.csv", ["frame", "time_s", "phase", *pose, *camera_columns], map(pose_row, frames))
     table(
         folder / "lambda.csv",
         ["frame", "time_s", *names],

@@ -63,6 +63,7 @@ MODEL = "model"
 ERROR = "quality/error"
 VISIBLE = "quality/visible"
 TIMING = "timing"
+STAGES = ("decode", "track", "reconstruct", "record")
 SPECTRUM = "coefficients/spectrum"
 LEADING = "coefficients/leading"
 EVENTS = "events"

@@ -2,12 +2,10 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Image
 from app.playback.overlay import overlaid
 from app.playback.playback import Playback
-
-Image = NDArray[np.uint8]
 
 COLUMNS, ROWS = 3, 2
 WIDTH_PX = 480  # of one frame

@@ -5,12 +5,10 @@ from time import process_time
 
 import numpy as np
 import pyceres
-from numpy.typing import NDArray
 
+from app.arrays import Array
 from app.rivals.problems import WindowStep
 from app.rivals.residuals import FrameData, change_weights, parameters, rest_weights
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

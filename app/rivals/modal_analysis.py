@@ -6,12 +6,10 @@ little against turning. Lumped mass. It is here for the time it takes.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, diags_array, kron
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from app.arrays import Array, Indices
 
 YOUNG, POISSON, THICKNESS = 1.0, 0.3, 1.0
 RIGID_MOTIONS = 6

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array
 from reconstruction.basis.constraints import ROWS
 from reconstruction.basis.mesh import Mesh, triangulate
 from reconstruction.basis.model import Model
@@ -14,8 +14,6 @@ from reconstruction.state import State, join
 from reconstruction.window.energy import Energy
 from reconstruction.window.solver import Solver, minimise
 from reconstruction.window.statistics import Statistics, frame_statistics, stack
-
-Array = NDArray[np.float64]
 
 WIDTH_PX, HEIGHT_PX, RELIEF_PX = 400.0, 300.0, 60.0
 FOCAL_PX = 640.0

@@ -4,13 +4,11 @@ A frame's parameters are q (4, w first), t (2), log s and the free rows of Λ' (
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array
 from app.rivals.problems import WindowStep
 from reconstruction.camera import SANDWICH, rotation_from_quaternion
 from reconstruction.state import State
-
-Array = NDArray[np.float64]
 
 TURN = SANDWICH.reshape(4, 4, 3, 3)
 TURN = TURN + TURN.swapaxes(0, 1)  # dR/dq_i = Σ_j TURN[ij] q_j

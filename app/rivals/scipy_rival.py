@@ -1,15 +1,13 @@
 """The window step by scipy.optimize.least_squares: trust region reflective, sparse analytic Jacobian."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.sparse import csr_array
 
+from app.arrays import Array
 from app.rivals.problems import WindowStep
 from app.rivals.residuals import FrameData, change_weights, parameters, rest_weights
 from reconstruction.camera import left_matrix
-
-Array = NDArray[np.float64]
 
 
 class ScipyWindow:

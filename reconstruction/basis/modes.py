@@ -12,6 +12,7 @@ from reconstruction.basis import distances, landmarks
 from reconstruction.basis.mesh import Mesh
 from reconstruction.settings import Metric
 
+ROW_NAMES = ("alpha", "beta", "tau")  # of Λ: stretching along two axes, and bending
 EXACT_POINTS = 4000  # with more, modes come from the distances to landmarks: all of D would take minutes and gigabytes
 EXACT_JENSEN_SHANNON = 1000  # the same for Jensen-Shannon distances, which take ten times as long
 

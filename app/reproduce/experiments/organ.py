@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array
 from tracking.tracks import Tracks
-
-Array = NDArray[np.float64]
 
 POINTS = 3024  # the paper's beating heart has as many
 SIZE = np.array([640.0, 480.0])

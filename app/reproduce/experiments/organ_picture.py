@@ -6,21 +6,19 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from app.arrays import Array, Indices
 from app.recording.modes_figure import View
 from app.reproduce.experiments.organ import FRAMES_PER_BEAT, REST_FRAMES
 from reconstruction.camera import nearest_rotation
 from tracking.tracks import Tracks
-
-Array = NDArray[np.float64]
 
 DPI = 110
 WORST = 0.15  # error at the end of the color scale, as a share of the true shape's RMS radius
 LIGHT = np.array([-0.45, -0.65, -0.62])
 
 
-def organ_picture(S: Array, tracks: Tracks, faces: NDArray[np.int64]) -> bytes:
+def organ_picture(S: Array, tracks: Tracks, faces: Indices) -> bytes:
     """A PNG: four moments of the last whole beat; the truth above, the reconstruction (F, 3, p) below."""
     assert tracks.S_gt is not None
     last = REST_FRAMES + (len(S) - 1 - REST_FRAMES) // FRAMES_PER_BEAT * FRAMES_PER_BEAT
@@ -55,7 +53,7 @@ def pair(ours: Array, truth: Array, rest: Array) -> tuple[Array, Array]:
     return np.asarray(ours * ((ours * truth).sum() / (ours * ours).sum())), truth
 
 
-def surface(shape: Array, faces: NDArray[np.int64], view: View, values: Array | None) -> PolyCollection:
+def surface(shape: Array, faces: Indices, view: View, values: Array | None) -> PolyCollection:
     """A shaded surface (3, p), the farthest triangles first; values (p,) from 0 to 1 turn it red."""
     a, b, c = (shape[:, faces[:, k]] for k in range(3))
     normals = np.cross((b - a).T, (c - a).T)

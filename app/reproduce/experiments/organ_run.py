@@ -1,8 +1,8 @@
 """The beating organ reconstructed with the paper's settings: general, r = 10, D_M (Fig. 7)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.arrays import Array
 from app.options.model import Model
 from app.options.run import Evaluate
 from app.reproduce.chart import Panel, Series, charts
@@ -13,8 +13,6 @@ from app.reproduce.result import Headline, Result, Table, percent
 from app.reproduce.work import Effort, Trial, Work
 from reconstruction.evaluation import e3d
 from tracking.tracks import Tracks
-
-Array = NDArray[np.float64]
 
 MODES = 10
 METRICS = ("manhattan", "euclidean")  # the paper's first

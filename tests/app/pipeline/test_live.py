@@ -133,7 +133,7 @@ def test_recordings_in_parts(modeshape: Command, videos: Path) -> None:
     frames: list[int] = []
     for name in ("day", "day-part2", "day-part3", "day-part4", "day-part5"):
         playback = Playback.load(Path(f"{name}.rrd"))
-        playback.need_model()
+        assert playback.recorded_model is not None
         assert playback.summary is not None
         assert playback.shaped.all()
         frames += playback.frames.tolist()

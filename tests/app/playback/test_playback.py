@@ -147,11 +147,11 @@ def test_run_without_a_model(tmp_path: Path) -> None:
     """As after a run that ended while it bootstrapped."""
     run = write_run(tmp_path / "early.rrd", frames=4, first_shape=9)
     playback = Playback.load(run.path)
-    assert playback.modelled is None
+    assert playback.recorded_model is None
     assert not playback.shaped.any()
     assert "contains no shapes" in " ".join(playback.notes)
     for use in (
-        playback.need_model,
+        lambda: playback.model,
         playback.shapes,
         lambda: playback.estimate(0),
         lambda: playback.basis,
