@@ -1,19 +1,17 @@
+"""What a recording holds, read back with Rerun."""
+
 import json
-import subprocess
-import sys
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
 from app.recording.recording import Recording, entities
-from app.terminal.errors import UsageError
 from reconstruction.camera import Camera
 from tests.synthetic_run import MODES, SIZE, STAGE_MS, Run, picture, verify, write_run
 from tracking.klt import Observation
@@ -134,13 +132,6 @@ def test_the_texture_is_the_first_frame(run: Run, rows: Rows) -> None:
     np.testing.assert_array_equal(image[texels[:, 1], texels[:, 0], ::-1], run.picture[pixels[:, 1], pixels[:, 0]])
 
 
-def test_frames_are_pictures(run: Run, rows: Rows) -> None:
-    [blob] = rows[entities.IMAGE, "EncodedImage:blob"][5]
-    decoded = cv2.imdecode(np.array(blob, np.uint8), cv2.IMREAD_COLOR)
-    assert decoded is not None
-    assert np.abs(decoded.astype(int) - run.picture).mean() < 4
-
-
 def test_points_are_lost_until_a_shape_predicts_them(run: Run, rows: Rows, tmp_path: Path) -> None:
     hidden = ~run.estimates[1].visible
     predicted = rows[entities.PREDICTED, "Points2D:positions"][1]
@@ -188,118 +179,3 @@ def test_an_orthographic_camera_has_no_pinhole(tmp_path: Path) -> None:
     rows = read(write_run(tmp_path / "flat.rrd", camera=Camera(np.inf, np.array([80.0, 60.0]))).path)
     assert rows[entities.MODEL, "modeshape.Model:perspective"][None] == [False]
     assert not any(entity == entities.CAMERA for entity, _ in rows)
-
-
-def test_a_file_is_not_replaced_silently(run: Run, tmp_path: Path) -> None:
-    path = tmp_path / "kept.rrd"
-    path.write_bytes(run.path.read_bytes())
-    with pytest.raises(UsageError, match=r"kept\.rrd exists: .*--overwrite.*--out"):
-        record(path)
-    assert path.read_bytes() == run.path.read_bytes()
-    with record(path, overwrite=True) as recording:
-        recording.observe(*frame(), phase="tracking")
-    verify(path)
-    assert path.stat().st_size < run.path.stat().st_size
-
-
-def fail(path: Path, error: type[BaseException], run: Run | None = None) -> None:
-    """A run that ends in an error after its first frame, whose shape is known if it is that of `run`."""
-    with record(path) as recording:
-        recording.observe(*frame(), phase="tracking")
-        if run:
-            recording.rest(run.basis, run.mesh, run.camera, picture(), run.pixels)
-            recording.estimate(0, 0.0, run.estimates[0])
-        raise error
-
-
-@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-def test_a_run_that_fails_leaves_a_complete_file(run: Run, tmp_path: Path, error: type[BaseException]) -> None:
-    path = tmp_path / "failed.rrd"
-    with pytest.raises(error):
-        fail(path, error, run)
-    verify(path)
-    assert (entities.SEEN, "Points2D:positions") in read(path)
-
-
-def test_a_run_that_fails_without_a_shape_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(RuntimeError):
-        fail(tmp_path / "failed.rrd", RuntimeError)
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_interrupted_run_is_kept_without_a_shape(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt):
-        fail(tmp_path / "interrupted.rrd", KeyboardInterrupt)
-    verify(tmp_path / "interrupted.rrd")
-
-
-def test_a_run_without_a_frame_leaves_no_file(tmp_path: Path) -> None:
-    path = tmp_path / "new" / "empty.rrd"
-    with record(path):
-        assert path.exists()
-    assert not path.exists()
-
-
-@pytest.mark.parametrize("options", [{"connect": "127.0.0.1:1"}, {"connect": "nonsense://x"}, {"connect": "a:b"}])
-def test_an_absent_viewer_is_an_error_and_leaves_no_file(tmp_path: Path, options: dict[str, str]) -> None:
-    with pytest.raises(UsageError, match=r"--connect|no viewer answers at 127\.0\.0\.1:1"):
-        record(tmp_path / "x.rrd", **options)
-    assert not list(tmp_path.iterdir())
-
-
-def test_an_unwritable_place_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UsageError, match=r"cannot write .*x\.rrd: .*--out"):
-        record(tmp_path / "file" / "x.rrd")
-    with pytest.raises(UsageError, match="--out"):
-        record(tmp_path, overwrite=True)
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
-def test_a_full_disk_is_an_error() -> None:
-    with pytest.raises(UsageError, match="cannot write /dev/full"):
-        record(Path("/dev/full"), overwrite=True)
-
-
-def test_without_file_and_viewer_nothing_happens() -> None:
-    with record(None) as recording:
-        recording.observe(*frame(), phase="tracking")
-        recording.timing(0, 0.0, STAGE_MS)
-        recording.summary({})
-    assert recording.path is None
-
-
-def test_the_video_file_can_stand_for_the_pictures(shared_data: Path, tmp_path: Path) -> None:
-    video = shared_data / "kinect_paper.mp4"
-    path = tmp_path / "video.rrd"
-    with record(path, image="video", video=video) as recording:
-        for index in range(3):
-            recording.observe(*frame(index), phase="tracking")
-    rows = read(path)
-    [blob] = rows[entities.IMAGE, "AssetVideo:blob"][None]
-    assert bytes(blob) == video.read_bytes()
-    stamps = rows[entities.IMAGE, "VideoFrameReference:timestamp"]
-    assert [stamps[index][0] for index in range(3)] == sorted({stamps[index][0] for index in range(3)})
-
-
-def test_a_video_that_cannot_be_stored_is_an_error(tmp_path: Path) -> None:
-    text = tmp_path / "text.mp4"
-    text.write_text("not a video")
-    for video in (None, text, tmp_path / "missing.mp4"):
-        with pytest.raises(UsageError, match="--image jpeg"):
-            record(tmp_path / "x.rrd", image="video", video=video)
-    assert not (tmp_path / "x.rrd").exists()
-
-
-def test_no_pictures_makes_a_small_file(tmp_path: Path, run: Run) -> None:
-    small = write_run(tmp_path / "none.rrd", image="none")
-    assert (entities.IMAGE, "EncodedImage:blob") not in read(small.path)
-    assert small.path.stat().st_size < run.path.stat().st_size
-
-
-def test_rerun_says_nothing_on_the_terminal(tmp_path: Path) -> None:
-    target = tmp_path / "quiet.rrd"
-    code = f"from pathlib import Path; from tests.synthetic_run import write_run; write_run(Path({str(target)!r}))"
-    root = Path(__file__).parents[3]
-    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, check=True)
-    assert done.stdout == done.stderr == b""

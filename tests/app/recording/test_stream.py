@@ -1,0 +1,144 @@
+"""The file of a recording: complete, or not there, and errors in words."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from app.recording.recording import Recording, entities
+from app.terminal.errors import UsageError
+from tests.synthetic_run import SIZE, STAGE_MS, Run, picture, verify, write_run
+from tracking.klt import Observation
+from tracking.video import Frame
+
+Rows = dict[tuple[str, str], dict[int | None, Any]]
+
+
+@pytest.fixture(autouse=True)
+def strict() -> Iterator[None]:
+    """Wrongly shaped data only warns otherwise."""
+    rr.set_strict_mode(True)
+    yield
+    rr.set_strict_mode(False)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return write_run(tmp_path_factory.mktemp("run") / "sheet.rrd")
+
+
+def read(path: Path) -> Rows:
+    """(entity, component) → frame, None for static → value; the last row of a frame counts."""
+    values: Rows = {}
+    for chunk in RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        names = batch.schema.names
+        frames = batch[entities.FRAME].to_pylist() if entities.FRAME in names else [None] * batch.num_rows
+        if entities.TIME in names:  # nanoseconds as numbers: Python's timedelta has none
+            batch = batch.set_column(names.index(entities.TIME), entities.TIME, batch[entities.TIME].cast("int64"))
+        for name in set(names) - {"rerun.controls.RowId", entities.FRAME}:
+            for frame, value in zip(frames, batch[name].to_pylist(), strict=True):
+                if value is not None:
+                    values.setdefault((chunk.entity_path.strip("/"), name), {})[frame] = value
+    return values
+
+
+def record(path: Path | None, **options: Any) -> Recording:
+    return Recording(path, configuration={}, size=SIZE, **options)
+
+
+def frame(index: int = 0) -> tuple[Frame, Observation]:
+    return Frame(index, index / 30, picture()), Observation(np.full((5, 2), 10.0), np.ones(5, bool))
+
+
+def test_a_file_is_not_replaced_silently(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "kept.rrd"
+    path.write_bytes(run.path.read_bytes())
+    with pytest.raises(UsageError, match=r"kept\.rrd exists: .*--overwrite.*--out"):
+        record(path)
+    assert path.read_bytes() == run.path.read_bytes()
+    with record(path, overwrite=True) as recording:
+        recording.observe(*frame(), phase="tracking")
+    verify(path)
+    assert path.stat().st_size < run.path.stat().st_size
+
+
+def fail(path: Path, error: type[BaseException], run: Run | None = None) -> None:
+    """A run that ends in an error after its first frame, whose shape is known if it is that of `run`."""
+    with record(path) as recording:
+        recording.observe(*frame(), phase="tracking")
+        if run:
+            recording.rest(run.basis, run.mesh, run.camera, picture(), run.pixels)
+            recording.estimate(0, 0.0, run.estimates[0])
+        raise error
+
+
+@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
+def test_a_run_that_fails_leaves_a_complete_file(run: Run, tmp_path: Path, error: type[BaseException]) -> None:
+    path = tmp_path / "failed.rrd"
+    with pytest.raises(error):
+        fail(path, error, run)
+    verify(path)
+    assert (entities.SEEN, "Points2D:positions") in read(path)
+
+
+def test_a_run_that_fails_without_a_shape_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError):
+        fail(tmp_path / "failed.rrd", RuntimeError)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_run_is_kept_without_a_shape(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        fail(tmp_path / "interrupted.rrd", KeyboardInterrupt)
+    verify(tmp_path / "interrupted.rrd")
+
+
+def test_a_run_without_a_frame_leaves_no_file(tmp_path: Path) -> None:
+    path = tmp_path / "new" / "empty.rrd"
+    with record(path):
+        assert path.exists()
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("options", [{"connect": "127.0.0.1:1"}, {"connect": "nonsense://x"}, {"connect": "a:b"}])
+def test_an_absent_viewer_is_an_error_and_leaves_no_file(tmp_path: Path, options: dict[str, str]) -> None:
+    with pytest.raises(UsageError, match=r"--connect|no viewer answers at 127\.0\.0\.1:1"):
+        record(tmp_path / "x.rrd", **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unwritable_place_is_an_error(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match=r"cannot write .*x\.rrd: .*--out"):
+        record(tmp_path / "file" / "x.rrd")
+    with pytest.raises(UsageError, match="--out"):
+        record(tmp_path, overwrite=True)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+def test_a_full_disk_is_an_error() -> None:
+    with pytest.raises(UsageError, match="cannot write /dev/full"):
+        record(Path("/dev/full"), overwrite=True)
+
+
+def test_without_file_and_viewer_nothing_happens() -> None:
+    with record(None) as recording:
+        recording.observe(*frame(), phase="tracking")
+        recording.timing(0, 0.0, STAGE_MS)
+        recording.summary({})
+    assert recording.path is None
+
+
+def test_rerun_says_nothing_on_the_terminal(tmp_path: Path) -> None:
+    target = tmp_path / "quiet.rrd"
+    code = f"from pathlib import Path; from tests.synthetic_run import write_run; write_run(Path({str(target)!r}))"
+    root = Path(__file__).parents[3]
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, check=True)
+    assert done.stdout == done.stderr == b""
