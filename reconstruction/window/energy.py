@@ -35,6 +35,7 @@ class Energy:
         tied: whether the oldest frame is tied to the frame that has left the window; without, the window floats.
         edges: coarse edges of the inextensibility term.
         bending: how the rows of Λ that are not estimated follow from row τ; None: they stay at rest.
+        residuals: weights and residuals of the priors that are given as such.
     """
 
     rotation: float = 3e-4
@@ -50,6 +51,7 @@ class Energy:
     tied: bool = True
     edges: CoarseEdges | None = None
     bending: Bending | None = None
+    residuals: tuple[tuple[float, priors.Residual], ...] = ()
 
     def about(self, centre: Array) -> "Energy":
         """The same energy about the rest shape Λ̄' (3, r): what it pulls to, and the lengths that edges keep."""
@@ -108,6 +110,7 @@ def build_energy(
         tied=not paper,
         edges=edges if weights["inextensibility"] else None,
         bending=Bending(edges, stiffness) if draws_in and edges else None,
+        residuals=tuple((weights[n], p.residual) for n, p in priors.PRIORS.items() if p.residual and weights[n]),
     )
 
 

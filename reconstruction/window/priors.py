@@ -4,12 +4,15 @@ Each is a sum of squares of dimensionless quantities (lengths in units of the re
 the mean squared reprojection error; any weights go together. The terms themselves are in `energy`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from reconstruction.arrays import Array
 from reconstruction.settings import PriorName
+from reconstruction.state import State
 
 Weights = dict[str, float]
+Residual = Callable[[State, tuple[int, ...]], tuple[Array, Array]]
 
 ORTHOGRAPHIC_SCALE = 1.0  # λ_s without depth, where only a zoom changes the scale
 PERSPECTIVE_SCALE = 1e-3  # λ_s with depth, where moving towards the camera does
@@ -28,11 +31,15 @@ class Prior:
         formula: the term; Δ is the change since the frame before.
         use: what it is for, and when to change its weight.
         default: weight by deformation and camera (perspective, orthographic), or by one of them, or otherwise.
+        residual: of a state of n frames and the estimated rows of Λ': residuals (n, k) and their derivatives (n, k, d) by
+            the POSE parameters and those rows; the term is the sum of their squares. None: the term is in `terms` or
+            `smoothness`, since it couples frames, or is made for speed.
     """
 
     formula: str
     use: str
     default: Mapping[str, float]
+    residual: Residual | None = None
 
     def weight(self, deformation: str, camera: str) -> float:
         """The weight unless somebody chooses another."""

@@ -28,6 +28,8 @@ def evaluate(energy: Energy, data: Statistics, state: State, before: Previous | 
     if energy.edges is not None:
         strain = energy.edges.strain(energy.edges.vectors(state.Lambda))
         value += energy.inextensibility * (strain**2).mean(axis=1)
+    for weight, residual in energy.residuals:
+        value += weight * (residual(state, energy.rows)[0] ** 2).sum(axis=1)
     add_smoothness_value(value, energy, state, before)
     return value
 
@@ -45,6 +47,7 @@ def linearise(
     if energy.bending is not None:
         normal = by_row_tau(normal, energy.bending.slope(state.Lambda))
     add_rest(normal, energy, state)
+    add_residuals(normal, energy, state)
     add_smoothness(normal, energy, state, before)
     if not energy.free_scale:
         normal.gradient[:, 5] = 0.0
@@ -111,6 +114,15 @@ def add_rest(normal: Normal, energy: Energy, state: State) -> None:
     weights = np.broadcast_to(energy.rest, free.shape).reshape(len(state), -1)
     normal.gradient[:, POSE:] += weights * free.reshape(len(state), -1)
     diagonals(normal.diagonal)[:, POSE:] += weights
+
+
+def add_residuals(normal: Normal, energy: Energy, state: State) -> None:
+    """Priors that are given by their residuals."""
+    for weight, residual in energy.residuals:
+        r, J = residual(state, energy.rows)
+        Jt = weight * J.transpose(0, 2, 1)
+        normal.gradient += (Jt @ r[:, :, None])[:, :, 0]
+        normal.diagonal += Jt @ J
 
 
 def add_inextensibility(normal: Normal, free_rows: tuple[int, ...], kappa: float, edges: CoarseEdges, state: State) -> None:
