@@ -7,7 +7,6 @@ import numpy as np
 from reconstruction.arrays import Array
 from reconstruction.settings import Deformation
 
-AXES = ("alpha", "beta", "tau")  # of the rows of Λ: α and β in the main plane, τ across it
 ALL_ROWS = (0, 1, 2)
 ROWS: dict[str, tuple[int, ...]] = {"bending": (2,), "stretching": (0, 1), "general": ALL_ROWS, "inextensible": ALL_ROWS}
 GIVE = 1e-2  # pull of rows α and β to rest, against the mean squared strain: what edges leave open stays small

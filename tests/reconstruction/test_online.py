@@ -1,70 +1,28 @@
 """The on-line estimator: frame by frame, on surfaces whose true shape is known."""
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 import pytest
 
 from reconstruction import ReconstructionError
-from reconstruction.basis import rest_shape
 from reconstruction.camera import Camera
-from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import e3d, with_missing, with_outliers
 from reconstruction.mapping.evidence import weigh
 from reconstruction.online import Phase, Reconstruction
 from reconstruction.settings import Deformation, Settings
+from tests.reconstruction.runs import (
+    FRAMES,
+    POINTS,
+    SETTINGS,
+    error,
+    reconstruct,
+    shapes_of,
+    static_error,
+    still_sheet,
+    swelling_hill,
+)
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, bending_sheet, flat, relief, seen, turn, turns
-
-FRAMES, POINTS = 26, 70
-SETTINGS = Settings(modes=8)
-
-
-def swelling_hill(camera: Camera = PERSPECTIVE) -> tuple[np.ndarray, np.ndarray]:
-    """A solid that turns rigidly for 15 frames, then one side of it swells and sinks."""
-    rest = relief(np.random.default_rng(0), POINTS)
-    x, y, _ = rest
-    bump = 60 * np.exp(-((x - 30) ** 2 + (y + 20) ** 2) / 60**2) * np.array([[0.3], [0.3], [1.0]])
-    amounts = np.concatenate([np.zeros(15), np.sin(np.linspace(0, np.pi, FRAMES - 15))])
-    shapes = rest + amounts[:, None, None] * (bump - bump.mean(axis=1, keepdims=True))
-    return seen(shapes, turns(FRAMES), camera)
-
-
-def still_sheet(noise_px: float = 0.05) -> np.ndarray:
-    rng = np.random.default_rng(1)
-    shapes = np.broadcast_to(flat(rng, POINTS), (70, 3, POINTS))
-    W, _ = seen(shapes, np.broadcast_to(np.eye(3), (70, 3, 3)), PERSPECTIVE)
-    return W + rng.normal(0, noise_px, W.shape)
-
-
-def reconstruct(
-    W: np.ndarray,
-    camera: Camera = PERSPECTIVE,
-    settings: Settings = SETTINGS,
-    truth: np.ndarray | None = None,
-    visible: np.ndarray | None = None,
-) -> tuple[Reconstruction, list[ShapeEstimate]]:
-    """All frames, as the frame loop gives them; with `truth`, its first shape is the rest shape."""
-    given = None if truth is None else rest_shape.given(truth[0], "truth", "first true shape")
-    visible = np.ones((len(W), W.shape[2]), bool) if visible is None else visible
-    reconstruction = Reconstruction(camera, settings, given)
-    estimates: list[ShapeEstimate] = []
-    for w, h in zip(W, visible, strict=True):
-        estimates += reconstruction.update(np.where(h, w, np.nan), h)
-    return reconstruction, estimates + reconstruction.finish()
-
-
-def shapes_of(estimates: list[ShapeEstimate]) -> np.ndarray:
-    return np.stack([e.shape for e in estimates])
-
-
-def error(estimates: list[ShapeEstimate], truth: np.ndarray) -> float:
-    return float(e3d(shapes_of(estimates), truth).mean())
-
-
-def static_error(reconstruction: Reconstruction, truth: np.ndarray) -> float:
-    assert reconstruction.rest is not None
-    return float(e3d(np.broadcast_to(reconstruction.rest.motion.shape, truth.shape), truth).mean())
 
 
 @pytest.mark.parametrize(("deformation", "share"), [("inextensible", 0.4), ("bending", 0.7)])
@@ -143,7 +101,7 @@ def test_a_source_that_ends_early_still_gets_its_shapes(kind: str) -> None:
 
 
 @pytest.mark.parametrize("frames", ["auto", 20])
-def test_a_still_scene_is_no_rigid_shape(frames: Literal["auto"] | int) -> None:
+def test_a_still_scene_is_no_rigid_shape(frames: "str | int") -> None:
     settings = replace(SETTINGS, rest_shape="rigid", bootstrap_frames=frames)
     words = r"cannot recover a rest shape: the object turned \d+\.\d° in \d+ frames, about 10° are needed"
     with pytest.raises(ReconstructionError, match=words):
@@ -174,9 +132,7 @@ def test_auto_finds_a_solid() -> None:
     ("deformation", "energy", "fixed"),
     [("bending", "paper", [0, 1]), ("stretching", "paper", [2]), ("stretching", "anchored", [2])],
 )
-def test_constraints_are_rows_that_stay_zero(
-    deformation: Deformation, energy: Literal["anchored", "paper"], fixed: list[int]
-) -> None:
+def test_constraints_are_rows_that_stay_zero(deformation: Deformation, energy: str, fixed: list[int]) -> None:
     W, truth = swelling_hill(ORTHOGRAPHIC)
     settings = replace(SETTINGS, deformation=deformation, energy=energy, refine_rest=False)
     _, estimates = reconstruct(W, ORTHOGRAPHIC, settings, truth=truth)
