@@ -2,6 +2,7 @@
 
 import csv
 import hashlib
+import io
 import os
 import shlex
 import subprocess
@@ -16,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.commands.batch_job import UNFINISHED, Job, Words, carry_out
+from app.files.writing import writable
 from app.options.batch import Batch
 from app.terminal.errors import UsageError
 from app.terminal.exit_code import ExitCode
@@ -162,8 +164,8 @@ def on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[Job, Words]]:
 
 def write_csv(path: Path, told: list[Words]) -> None:
     """The same as a file."""
-    with path.open("w", newline="") as file:
-        rows = csv.DictWriter(file, ("name", "source", *COLUMNS, "recording", "error"), extrasaction="ignore")
+    with writable(path) as file, io.TextIOWrapper(file, "utf-8", newline="") as text:
+        rows = csv.DictWriter(text, ("name", "source", *COLUMNS, "recording", "error"), extrasaction="ignore")
         rows.writeheader()
         rows.writerows(told)
 

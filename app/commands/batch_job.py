@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.files.writing import write_json
 from app.terminal.exit_code import ExitCode
 
 Words = dict[str, object]
@@ -82,7 +83,7 @@ def carry_out(job: Job, started: Callable[["subprocess.Popen[str]"], None] = lam
         error = reason(process.returncode, err)
         if process.returncode == ExitCode.BAD_INPUT:
             unfinished.unlink(missing_ok=True)
-            write(job.report, {"source": job.video, "error": error})
+            write_json(job.report, {"source": job.video, "error": error})
         return {"source": job.video, "error": error}
     words: Words = json.loads(out)
     unfinished.replace(job.recording)
@@ -90,7 +91,7 @@ def carry_out(job: Job, started: Callable[["subprocess.Popen[str]"], None] = lam
     for number in range(2, int(str(words.get("parts", 1))) + 1):
         part = unfinished.with_name(f"{job.name}-part{number}.rrd").replace(job.folder / f"{job.name}-part{number}.rrd")
         words["last_part"] = str(part)
-    write(job.report, words)
+    write_json(job.report, words)
     return words
 
 
@@ -103,10 +104,3 @@ def reason(code: int, err: str) -> str:
     if code == ExitCode.INTERRUPTED:
         return "interrupted"
     return f"killed by signal {-code}" if code < 0 else f"exit code {code}: {last}"
-
-
-def write(path: Path, words: Words) -> None:
-    """A JSON file that appears only when complete."""
-    part = path.with_name(path.name + ".part")
-    part.write_text(json.dumps(words, indent=2) + "\n")
-    part.replace(path)

@@ -1,6 +1,7 @@
 """Writing files: seen to before the work, and under their names only when complete."""
 
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
@@ -20,9 +21,9 @@ def check_free(path: Path | None, *, overwrite: bool) -> None:
         raise UsageError(f"{path} exists: replace it with --overwrite, or choose another name")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("ab"):
-            pass
-        if path.stat().st_size == 0:
+        new = not path.exists()
+        path.open("ab").close()
+        if new:  # and nothing else: a device is empty, too
             path.unlink()
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror}; choose another place") from error
@@ -44,3 +45,9 @@ def writable(path: Path) -> Iterator[BinaryIO]:
         raise UsageError(f"cannot write {path}: {error.strerror}; free some space or choose another place") from error
     finally:
         part.unlink(missing_ok=True)
+
+
+def write_json(path: Path, words: Mapping[str, object]) -> None:
+    """A JSON file; errors as of `writable`."""
+    with writable(path) as file:
+        file.write((json.dumps(words, indent=2) + "\n").encode())

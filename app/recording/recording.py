@@ -15,9 +15,10 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from app.arrays import Array, Image, Indices
+from app.files.writing import check_free
 from app.recording import entities
 from app.recording.images import cropped, embedded_video, jpeg, texture
-from app.recording.stream import Stream, check_writable
+from app.recording.stream import Stream
 from app.recording.styles import LEADING, coefficient_styles, placement, styles
 from app.recording.viewer import running_viewer, spawned_viewer
 from app.recording.wireframe import edge_strips, line_strips
@@ -77,7 +78,7 @@ class Recording:
         if image == "video":
             asset, self._video_ns = embedded_video(video)
         if path is not None:
-            check_writable(path, overwrite=overwrite)
+            check_free(path, overwrite=overwrite)
         if view:
             urls.append(spawned_viewer())
         self._stream = Stream(path, urls)

@@ -144,21 +144,3 @@ def index(path: Path) -> None:
         pass
     finally:
         part.unlink(missing_ok=True)
-
-
-def check_writable(path: Path, *, overwrite: bool) -> None:
-    """Make sure that a file can be written, creating its folder, before anything is computed.
-
-    Raises:
-        UsageError: it exists and may not be replaced, or cannot be written.
-    """
-    if path.exists() and not overwrite:
-        raise UsageError(f"{path} exists: replace it with --overwrite, or choose another with --out")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        new = not path.exists()
-        path.open("ab").close()
-        if new:
-            path.unlink()
-    except OSError as error:
-        raise UsageError(f"cannot write {path}: {error.strerror}; choose another place with --out") from error

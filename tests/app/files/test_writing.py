@@ -42,3 +42,10 @@ def test_a_place_is_seen_to_before_the_work(tmp_path: Path) -> None:
     assert path.read_text() == "somebody's work"
     with pytest.raises(UsageError, match="cannot write"):
         check_free(path / "table.csv", overwrite=False)
+
+
+def test_an_empty_file_that_was_there_stays(tmp_path: Path) -> None:
+    path = tmp_path / "empty.npz"
+    path.touch()
+    check_free(path, overwrite=True)
+    assert path.exists()
