@@ -179,12 +179,7 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Played:
     Raises:
         UsageError: it cannot be read, has no model or no pictures, or an option does not go with it.
     """
-    live = {
-        "--roi": command.roi,
-        "--mask": command.mask,
-        "--rrd": command.rrd,
-        "--view": command.view or None,
-    }
+    live = {"--roi": command.roi, "--mask": command.mask, "--rrd": command.rrd, "--view": command.view or None}
     for option in (name for name, value in live.items() if value is not None):
         raise UsageError(f"{option} is for videos, not for the recording {command.source}: leave it out")
     playback = Playback.load(Path(command.source))
