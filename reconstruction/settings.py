@@ -39,7 +39,8 @@ class Settings:
     energy: Literal["anchored", "paper"] = "anchored"
     """Anchored: tied to the past and pulled to rest. Paper: the paper's section 5 as printed (orthographic)."""
     priors: Mapping[str, float] = field(default_factory=dict, hash=False)
-    """Weights of the energy's priors instead of its own, 0 for none: rest, smoothness, rotation, scale, inextensibility."""
+    """Weights of the energy's priors instead of its own, 0 for none: rest, smoothness, rotation, scale,
+    inextensibility."""
     refine_rest: bool = True
     """Let later frames improve the rest shape. Not with the paper's energy."""
     estimate_focal: bool = False
