@@ -168,7 +168,7 @@ def test_evaluate(modeshape: Command, files: Path, videos: Path, arguments: list
     assert tree(files) == before
 
 
-@pytest.mark.parametrize("arguments", [["dance"], ["--nonsense"], []], ids=str)
+@pytest.mark.parametrize("arguments", [["dance"], ["--nonsense"]], ids=str)
 def test_no_such_command(modeshape: Command, arguments: list[str]) -> None:
     check(modeshape(*arguments), "modeshape")
 
