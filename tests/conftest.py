@@ -25,5 +25,6 @@ def shared_data() -> Path:
     """The folder of real sequences with ground truth that lies beside the checkout."""
     folder = Path(__file__).parents[1].parent / "shared" / "data"
     if not folder.is_dir():
-        pytest.skip(f"no research data at {folder}")
+        reason = f"no research data at {folder}"
+        pytest.fail(reason) if os.environ.get("CI") == "true" else pytest.skip(reason)
     return folder
