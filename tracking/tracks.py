@@ -4,7 +4,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, BinaryIO, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,19 +77,11 @@ class Tracks:
         except TrackingError as error:
             raise TrackingError(f"{path}: {error}") from None
 
-    def save(self, path: Path) -> None:
-        """Write an .npz file that `load` reads.
-
-        Raises:
-            TrackingError: the file cannot be written.
-        """
+    def save(self, file: BinaryIO) -> None:
+        """Write what `load` reads into a file that is open, as .npz."""
         optional = {"K": self.K, "S_gt": self.S_gt, "gt_frames": self.gt_frames}
         arrays: dict[str, Any] = {name: value for name, value in optional.items() if value is not None}
-        try:
-            with path.open("wb") as file:  # not by name: NumPy would add .npz to it
-                np.savez_compressed(file, W=self.W, visible=self.visible, **arrays)
-        except OSError as error:
-            raise TrackingError(f"cannot write the tracks to {path}: {error.strerror}") from None
+        np.savez_compressed(file, W=self.W, visible=self.visible, **arrays)
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,8 @@ def evaluate_many() -> int:
     seen = np.ones((MANY_FRAMES, MANY_POINTS), np.bool_)
     with TemporaryDirectory(prefix="modeshape-") as folder:
         path = Path(folder, "tracks.npz")
-        Tracks(W, seen, K=K, S_gt=shapes, gt_frames=np.arange(MANY_FRAMES)).save(path)
+        with path.open("wb") as file:
+            Tracks(W, seen, K=K, S_gt=shapes, gt_frames=np.arange(MANY_FRAMES)).save(file)
         evaluate(Evaluate(path, rest_shape="first-truth", model=Model(modes=30)), Progress())
     return MANY_POINTS
 

@@ -1,18 +1,15 @@
 """`modeshape export`: a recording as files for other programs; from the recording alone."""
 
-import shutil
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Literal
 
 import cv2
 import numpy as np
 
 from app.arrays import Array, Indices
-from app.files.writing import check_free, writable
+from app.files.writing import check_free, check_free_folder, writable, writable_folder
 from app.options.export import Export
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
@@ -59,7 +56,7 @@ def export(command: Export, progress: Progress) -> Exported:
     kind = command.kind
     out = command.out or default_path(command.recording, kind)
     if kind in FOLDERS:
-        check_folder(out, overwrite=command.overwrite)
+        check_free_folder(out, overwrite=command.overwrite)
     playback = Playback.load(command.recording)
     for note in playback.notes:
         progress.say(note)
@@ -84,12 +81,12 @@ def export(command: Export, progress: Progress) -> Exported:
         elif kind == "csv":
             from app.playback.tables import write_csv
 
-            with complete_folder(out) as folder:
+            with writable_folder(out, OWN_FILES) as folder:
                 write_csv(playback, folder, advance)
         elif kind in VIDEOS:
             write_video(playback, out, advance)
         else:
-            with complete_folder(out) as folder:
+            with writable_folder(out, OWN_FILES) as folder:
                 write_meshes(playback, folder, command, advance)
     return Exported(
         exported=playback.path,
@@ -151,11 +148,11 @@ def write_meshes(playback: Playback, folder: Path, command: Export, advance: Cal
 
 def write_video(playback: Playback, out: Path, advance: Callable[[], None]) -> None:
     """The pictures with mesh, points and reprojections drawn over them, at the video's pace."""
-    from app.files.video_out import VideoSink
+    from app.files.video_out import writable_video
     from app.playback.overlay import enlarged, overlaid
 
     fps, shown = steady(playback.times_s)
-    with VideoSink(out, enlarged(playback.size), fps) as video:
+    with writable_video(out, enlarged(playback.size), fps) as video:
         for i, image in overlaid(playback):
             for _ in range(int(shown[i])):
                 video.write(image)
@@ -190,48 +187,6 @@ def default_path(recording: Path, kind: str) -> Path:
     if kind in FOLDERS:
         return recording.with_name(f"{recording.stem}_{kind}")
     return recording.with_name(f"{recording.stem}{'-overlay' if kind in VIDEOS else ''}.{kind}")
-
-
-def check_folder(folder: Path, *, overwrite: bool) -> None:
-    """See to it, before anything is computed, that files can be written into a folder of their own.
-
-    Raises:
-        UsageError: there is something in it and may not be replaced, or it cannot be made.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise UsageError(f"{folder} is a file: choose another name for the folder")
-    if folder.is_dir() and any(folder.iterdir()) and not overwrite:
-        raise UsageError(f"{folder} exists: replace what is in it with --overwrite, or choose another name")
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryDirectory(dir=folder if folder.is_dir() else folder.parent):
-            pass
-    except OSError as error:
-        raise UsageError(f"cannot write {folder}: {error.strerror}; choose another place") from error
-
-
-@contextmanager
-def complete_folder(folder: Path) -> Iterator[Path]:
-    """A folder to write files to, which appear in `folder` when all are there; of an earlier export nothing remains.
-
-    Raises:
-        UsageError: the files cannot be written.
-    """
-    part = folder.with_name(folder.name + ".part")
-    try:
-        shutil.rmtree(part, ignore_errors=True)
-        part.mkdir()
-        yield part
-        folder.mkdir(exist_ok=True)
-        for pattern in OWN_FILES:  # and nothing else: the folder may be anybody's
-            for old in folder.glob(pattern):
-                old.unlink()
-        for made in part.iterdir():
-            made.replace(folder / made.name)
-    except OSError as error:
-        raise UsageError(f"cannot write {folder}: {error.strerror}; free some space or choose another place") from error
-    finally:
-        shutil.rmtree(part, ignore_errors=True)
 
 
 def megabytes(path: Path) -> float:

@@ -3,20 +3,19 @@
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from time import perf_counter
-from types import TracebackType
-from typing import Self, cast
+from typing import cast
 
 import cv2
 import numpy as np
 
-from app.arrays import Array, Image
+from app.arrays import Image
 from app.commands.export import steady
-from app.files.video_out import PacedVideo, VideoSink, check_video_format
+from app.files.video_out import check_video_format
 from app.files.writing import check_free
 from app.options.retexture import Retexture
 from app.options.run import parse_range
-from app.painting.compositing import Compositor, Placement
+from app.painting.compositing import Placement
+from app.painting.painter import Painter
 from app.painting.picture import Texture
 from app.pipeline.interrupts import completed
 from app.pipeline.session import Session
@@ -26,8 +25,6 @@ from app.terminal.errors import UsageError
 from app.terminal.exit_code import ExitCode
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary
-from reconstruction.basis.model import Model
-from reconstruction.estimate import ShapeEstimate
 from tracking.klt import Observation
 from tracking.video import Frame
 
@@ -80,76 +77,10 @@ def retexture(command: Retexture, progress: Progress) -> Painted:
     """
     check_video_format(command.out)
     check_free(command.out, overwrite=command.overwrite)
-    with Texture(command.texture) as texture, Painter(command, texture) as painter:
+    placement = Placement(command.place, command.opacity)
+    with Texture(command.texture) as texture, Painter(command.out, texture, placement) as painter:
         on = (play if is_recording(command.source) else follow)(command, painter, progress)
     return Painted(on, painter.painted, painter.milliseconds, command.out)
-
-
-class Painter:
-    """Paints frames as they come and writes them; a context manager that completes the video.
-
-    Args:
-        command: what the person asked for.
-        texture: the picture or video put on the surface.
-    """
-
-    def __init__(self, command: Retexture, texture: Texture) -> None:
-        self._out, self._placement = command.out, Placement(command.place, command.opacity)
-        self._texture = texture
-        self._sink: VideoSink | None = None
-        self._compositor: Compositor | None = None
-        self._begun_s = 0.0
-        self._elapsed_s = 0.0
-        self.painted = 0
-
-    @property
-    def milliseconds(self) -> float | None:
-        """Mean time of painting a frame."""
-        return self._elapsed_s * 1e3 / self.painted if self.painted else None
-
-    def begin(self, first: Frame, points_px: Array, model: Model, fps: float) -> None:
-        """The first frame, the vertices (p, 2) px in it, the model, and the rate of the video.
-
-        Of a second object, it is not painted: the picture was made for the first.
-        """
-        if self._sink is not None:
-            self._compositor = None
-            return
-        perspective = model.camera.perspective
-        self._compositor = Compositor(
-            first.image, points_px, model.mesh, perspective=perspective, placement=self._placement
-        )
-        height, width = first.image.shape[:2]
-        self._sink = VideoSink(self._out, (width, height), fps).__enter__()
-        self._paced = PacedVideo(self._sink, fps)
-        self._begun_s = first.time_s
-
-    def frame(self, frame: Frame, observation: Observation, estimate: ShapeEstimate | None) -> None:
-        """Paint and write a frame; one without a shape stays as it is."""
-        if self._sink is None:
-            return
-        image = frame.image
-        if estimate is not None and self._compositor is not None:
-            picture = self._texture.at(frame.time_s - self._begun_s)
-            started = perf_counter()
-            image = self._compositor.paint(image, picture, estimate.projection_px, estimate.shape[2], observation.points_px)
-            self._elapsed_s += perf_counter() - started
-            self.painted += 1
-        self._paced.write(image, frame.time_s)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self._sink is None:
-            return
-        try:
-            if kind is None:
-                self._paced.end()
-        except UsageError as failure:
-            self._sink.__exit__(UsageError, failure, None)
-            raise
-        self._sink.__exit__(kind, error, trace)
 
 
 def follow(command: Retexture, painter: Painter, progress: Progress) -> RunSummary:

@@ -12,6 +12,7 @@ from typing import Self
 import cv2
 
 from app.arrays import Image
+from app.files.writing import moved_when_complete
 from app.terminal.errors import UsageError
 
 CODECS = {".mp4": "mp4v", ".webm": "VP80"}
@@ -19,8 +20,9 @@ CHECKED_FRAMES = 30  # between two looks at the disk
 FULL_BYTES = 2**20  # so little left on a disk explains a failure
 
 
-class VideoSink:
-    """A video being written; a context manager.
+@contextmanager
+def writable_video(path: Path, size: tuple[int, int], fps: float) -> Iterator["VideoSink"]:
+    """A video that appears under its name only when complete.
 
     .mp4 (MPEG-4 part 2) is written fast and plays in every player, but not in browsers; .webm (VP8) plays there too.
 
@@ -30,20 +32,37 @@ class VideoSink:
         fps: frames per second.
 
     Raises:
-        UsageError: another format, or the file cannot be written.
+        UsageError: another format, no frame, or the file cannot be written.
+    """
+    check_video_format(path)
+    with moved_when_complete(path) as part:
+        sink = VideoSink(path, part, size, fps)
+        try:
+            yield sink
+        finally:
+            sink.release()
+        sink.check()
+
+
+class VideoSink:
+    """Where the frames of a video go, as `writable_video` opens it.
+
+    Args:
+        path: what the file is to be called, for errors.
+        part: the file.
+        size, fps: of `writable_video`.
+
+    Raises:
+        UsageError: it cannot be written.
     """
 
-    def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
-        check_video_format(path)
-        self.path = path
-        self._part = path.with_name(f"{path.stem}.part{path.suffix}")
-        self._size = size
+    def __init__(self, path: Path, part: Path, size: tuple[int, int], fps: float) -> None:
+        self._path, self._part, self._size = path, part, size
         codec = CODECS[path.suffix.lower()]
         # Containers store a rate as a fraction: three digits are enough for it to be a short one.
         with quiet():
-            self._writer = cv2.VideoWriter(str(self._part), cv2.VideoWriter.fourcc(*codec), round(fps, 3), size)
+            self._writer = cv2.VideoWriter(str(part), cv2.VideoWriter.fourcc(*codec), round(fps, 3), size)
         if not self._writer.isOpened():
-            self._part.unlink(missing_ok=True)
             raise UsageError(f"cannot write {path}: this OpenCV has no {codec} encoder, or the folder is not writable")
         self._frames = 0
 
@@ -59,22 +78,18 @@ class VideoSink:
         if self._frames % CHECKED_FRAMES == 0 and self._full():
             raise self._failure("the disk is full")
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def release(self) -> None:
+        """No more frames come."""
         self._writer.release()
-        try:
-            if kind is None:
-                self._check()
-                self._part.replace(self.path)
-        finally:
-            self._part.unlink(missing_ok=True)
 
-    def _check(self) -> None:
-        """OpenCV does not say when a disk is full: every frame must be there again, and room beside them."""
+    def check(self) -> None:
+        """See to it that every frame can be read again, and room is left: OpenCV does not say when a disk is full.
+
+        Raises:
+            UsageError: no frame was written, or not all of them.
+        """
         if self._frames == 0:
-            raise UsageError(f"cannot write {self.path}: there is no frame to write")
+            raise UsageError(f"cannot write {self._path}: there is no frame to write")
         if self._full():
             raise self._failure("the disk is full")
         with quiet():
@@ -90,11 +105,13 @@ class VideoSink:
         return shutil.disk_usage(self._part.parent).free < FULL_BYTES
 
     def _failure(self, reason: str) -> UsageError:
-        return UsageError(f"cannot write {self.path}: {reason}; free some space or choose another place with --out")
+        return UsageError(f"cannot write {self._path}: {reason}; free some space or choose another place with --out")
 
 
 class PacedVideo:
     """Frames with times of their own in a video of constant rate: each is shown until the next one's time.
+
+    A context manager that at its end shows the last frame, too.
 
     Args:
         sink: the video.
@@ -114,9 +131,12 @@ class PacedVideo:
         self._fill(round((time_s - self._begun_s) * self._fps))
         self._shown = image
 
-    def end(self) -> None:
-        """Show the last frame, too."""
-        self._fill(self._frames + 1)
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if kind is None:
+            self._fill(self._frames + 1)
 
     def _fill(self, frames: int) -> None:
         while self._shown is not None and self._frames < frames:

@@ -1,9 +1,11 @@
-"""Writing files: seen to before the work, and under their names only when complete."""
+"""Writing files and folders: seen to before the work, and under their names only when complete."""
 
 import json
-from collections.abc import Iterator, Mapping
+import shutil
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 from app.terminal.errors import UsageError
@@ -29,22 +31,79 @@ def check_free(path: Path | None, *, overwrite: bool) -> None:
         raise UsageError(f"cannot write {path}: {error.strerror}; choose another place") from error
 
 
+def check_free_folder(folder: Path, *, overwrite: bool) -> None:
+    """See to it, before anything is computed, that files can be written into a folder of their own.
+
+    Raises:
+        UsageError: there is something in it and may not be replaced, or it cannot be made.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise UsageError(f"{folder} is a file: choose another name for the folder")
+    if folder.is_dir() and any(folder.iterdir()) and not overwrite:
+        raise UsageError(f"{folder} exists: replace what is in it with --overwrite, or choose another name")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryDirectory(dir=folder if folder.is_dir() else folder.parent):
+            pass
+    except OSError as error:
+        raise UsageError(f"cannot write {folder}: {error.strerror}; choose another place") from error
+
+
 @contextmanager
-def writable(path: Path) -> Iterator[BinaryIO]:
-    """A binary file that appears under its name only when complete.
+def moved_when_complete(path: Path) -> Iterator[Path]:
+    """A path beside a file's, with the same ending, to write it to; the file is moved to its place if nothing fails.
 
     Raises:
         UsageError: the file cannot be written.
     """
-    part = path.with_name(path.name + ".part")
+    part = path.with_name(f"{path.stem}.part{path.suffix}")
     try:
-        with part.open("wb") as file:
-            yield file
+        yield part
         part.replace(path)
     except OSError as error:
-        raise UsageError(f"cannot write {path}: {error.strerror}; free some space or choose another place") from error
+        raise no_space(path, error) from error
     finally:
         part.unlink(missing_ok=True)
+
+
+@contextmanager
+def writable(path: Path) -> Iterator[BinaryIO]:
+    """A binary file that appears under its name only when complete; errors as of `moved_when_complete`."""
+    with moved_when_complete(path) as part, part.open("wb") as file:
+        yield file
+
+
+@contextmanager
+def writable_folder(folder: Path, replaced: Iterable[str]) -> Iterator[Path]:
+    """A folder to write files to, which appear in `folder` when all are there.
+
+    Args:
+        folder: where they belong.
+        replaced: patterns of files of an earlier time, which are removed; the folder may hold anybody's others.
+
+    Raises:
+        UsageError: the files cannot be written.
+    """
+    part = folder.with_name(f"{folder.name}.part")
+    try:
+        shutil.rmtree(part, ignore_errors=True)
+        part.mkdir()
+        yield part
+        folder.mkdir(exist_ok=True)
+        for pattern in replaced:
+            for old in folder.glob(pattern):
+                old.unlink()
+        for made in part.iterdir():
+            made.replace(folder / made.name)
+    except OSError as error:
+        raise no_space(folder, error) from error
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+
+
+def no_space(path: Path, error: OSError) -> UsageError:
+    """What is told of a file or folder that could not be written to its end."""
+    return UsageError(f"cannot write {path}: {error.strerror}; free some space or choose another place")
 
 
 def write_json(path: Path, words: Mapping[str, object]) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.files.writing import writable
 from app.options.run import Run, as_words
 from app.painting.compositing import Placement, painted
 from app.painting.picture import first_picture
@@ -163,7 +164,8 @@ class TrackedObject:
             W = np.stack([o.points_px.T for o in self._tracks])
             visible = np.stack([o.visible for o in self._tracks])
             camera = self.reconstruction.camera
-            Tracks(W, visible, K=camera.K if camera.perspective else None).save(output.tracks_out)
+            with writable(output.tracks_out) as file:
+                Tracks(W, visible, K=camera.K if camera.perspective else None).save(file)
         if output.shapes_out and self.collected.estimates:
             save_shapes(output.shapes_out, self.collected.estimates, self.reconstruction.model, self.collected.lost)
 

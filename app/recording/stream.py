@@ -9,6 +9,7 @@ from threading import Thread
 import rerun as rr
 import rerun_cli  # type: ignore[import-untyped]
 
+from app.files.writing import moved_when_complete
 from app.recording import entities
 from app.recording.blueprint import blueprint
 from app.recording.environment import environment
@@ -124,23 +125,19 @@ def index(path: Path) -> None:
 
     A process of its own reads the whole file for it, which is why that of very long recordings stays as it is.
     """
-    part = path.with_name(path.name + ".part")
     program = Path(rerun_cli.__file__).with_name("rerun")
     try:
         if path.stat().st_size > INDEXED_BYTES or shutil.disk_usage(path.parent).free < path.stat().st_size + FULL_BYTES:
             return
-        done = subprocess.run(
-            [program, "rrd", "optimize", "--max-rows", "1", "--max-size", "1B", path, "-o", part],
-            env=environment(),
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            check=False,
-            timeout=INDEX_S,
-            start_new_session=True,  # Ctrl-C ends the run, not this
-        )
-        if done.returncode == 0:
-            part.replace(path)
-    except (OSError, subprocess.TimeoutExpired):
+        with moved_when_complete(path) as part:
+            subprocess.run(
+                [program, "rrd", "optimize", "--max-rows", "1", "--max-size", "1B", path, "-o", part],
+                env=environment(),
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                check=True,
+                timeout=INDEX_S,
+                start_new_session=True,  # Ctrl-C ends the run, not this
+            )
+    except (OSError, UsageError, subprocess.SubprocessError):
         pass
-    finally:
-        part.unlink(missing_ok=True)

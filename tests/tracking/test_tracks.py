@@ -28,7 +28,8 @@ def test_saved_tracks_come_back(tmp_path: Path) -> None:
     visible = RNG.random((F, P)) < 0.7
     tracks = Tracks(np.where(visible[:, None], W, np.nan), visible, K, S, np.array([1, 4]))
     path = tmp_path / "any name"
-    tracks.save(path)
+    with path.open("wb") as file:
+        tracks.save(file)
     loaded = Tracks.load(path)
     for name in ("W", "visible", "K", "S_gt", "gt_frames"):
         np.testing.assert_array_equal(getattr(loaded, name), getattr(tracks, name))
@@ -123,12 +124,6 @@ def test_an_npz_of_objects_is_refused(tmp_path: Path) -> None:
     np.savez(path, W=np.array([{"a": 1}], object))
     with pytest.raises(TrackingError, match="holds objects that are not arrays"):
         Tracks.load(path)
-
-
-def test_saving_where_nothing_can_be_written(tmp_path: Path) -> None:
-    tracks = Tracks(W, np.ones((F, P), bool))
-    with pytest.raises(TrackingError, match=f"cannot write the tracks to {tmp_path}"):
-        tracks.save(tmp_path / "missing" / "tracks.npz")
 
 
 def test_truth_comes_with_pixels_or_in_a_track_file(tmp_path: Path) -> None:

@@ -28,7 +28,8 @@ def beating_organ(work: Work) -> Result:
     frames = 40 if work.effort.quick else 110
     tracks = organ_tracks(frames, points(work.effort))
     path, shapes_out = work.scratch / "organ.npz", work.scratch / "organ-shapes.npz"
-    tracks.save(path)
+    with path.open("wb") as file:
+        tracks.save(file)
     trials: list[Trial] = []
     for metric in METRICS:
         model = Model(modes=MODES, metric=metric, deformation="general", bootstrap_frames=REST_FRAMES)  # type: ignore[arg-type]

@@ -39,7 +39,8 @@ def tracks(tmp_path: Path) -> Path:
     W = S[:, :2] + 200
     visible = np.ones((FRAMES, POINTS), bool)
     path = tmp_path / "bowl.npz"
-    Tracks(W, visible, S_gt=S, gt_frames=np.arange(FRAMES)).save(path)
+    with path.open("wb") as file:
+        Tracks(W, visible, S_gt=S, gt_frames=np.arange(FRAMES)).save(file)
     return path
 
 

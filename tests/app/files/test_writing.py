@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from app.files.writing import check_free, writable
+from app.files.writing import check_free, check_free_folder, writable, writable_folder
 from app.terminal.errors import UsageError
 
 
@@ -49,3 +49,20 @@ def test_an_empty_file_that_was_there_stays(tmp_path: Path) -> None:
     path.touch()
     check_free(path, overwrite=True)
     assert path.exists()
+
+
+def test_a_folder_is_filled_when_all_is_there_and_keeps_what_is_not_ours(tmp_path: Path) -> None:
+    folder = tmp_path / "meshes"
+    check_free_folder(folder, overwrite=False)
+    assert list(tmp_path.iterdir()) == []
+    folder.mkdir()
+    for name in ("frame_9.obj", "notes.txt"):
+        (folder / name).write_text("before")
+    with pytest.raises(UsageError, match="meshes exists: replace what is in it with --overwrite"):
+        check_free_folder(folder, overwrite=False)
+    check_free_folder(folder, overwrite=True)
+    with writable_folder(folder, ["frame_*.obj"]) as unfinished:
+        (unfinished / "frame_1.obj").write_text("now")
+        assert not (folder / "frame_1.obj").exists()
+    assert {path.name for path in folder.iterdir()} == {"frame_1.obj", "notes.txt"}
+    assert list(tmp_path.iterdir()) == [folder]

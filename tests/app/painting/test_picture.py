@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.files.video_out import VideoSink
+from app.files.video_out import writable_video
 from app.painting.picture import Texture
 from tests.app.card import card
 from tracking.video import Video
@@ -30,7 +30,7 @@ def frames_of(path: Path) -> list[Image]:
 
 def test_a_video_moves_on_the_surface_and_begins_again(tmp_path: Path) -> None:
     path = tmp_path / "moving.mp4"
-    with VideoSink(path, (64, 48), 10.0) as sink:
+    with writable_video(path, (64, 48), 10.0) as sink:
         for level in (40, 90, 140, 190):
             sink.write(np.full((48, 64, 3), level, np.uint8))
     with Texture(path) as texture:

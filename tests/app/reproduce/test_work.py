@@ -8,7 +8,8 @@ from app.reproduce.work import Effort, Work
 
 
 def test_a_trial_is_computed_once_and_fails_in_words(tmp_path: Path) -> None:
-    organ_tracks(6, 40).save(tmp_path / FLAG.file)
+    with (tmp_path / FLAG.file).open("wb") as file:
+        organ_tracks(6, 40).save(file)
     with Work(tmp_path, tmp_path, Effort(quick=True), 1.0) as work, work.experiment("trial", 1.0, 3):
         config = FLAG.config(tmp_path, modes=5, deformation="general")
         first = work.evaluated(config)
