@@ -1,4 +1,4 @@
-"""Log lengths of edges between points along rays: residuals, derivatives, and depths that keep them the same in all frames."""
+"""Log lengths of edges between points along rays, and the depths that keep them the same in all frames."""
 
 from dataclasses import dataclass, replace
 
@@ -29,24 +29,27 @@ class Edges:
     weights: Array
 
     def log_lengths(self, c: Array) -> Array:
-        """g = ½ log(μ_i²|q_i|² − 2 μ_i μ_j q_i·q_j + μ_j²|q_j|²) (F, n) at coefficients c (F, r)."""
+        """The logs g = ½ log(μ_i²|q_i|² − 2 μ_i μ_j q_i·q_j + μ_j²|q_j|²) (F, n) at c (F, r)."""
         mi, mj = np.exp(c @ self.B[0].T), np.exp(c @ self.B[1].T)
         squared = mi**2 * self.squares[:, 0] - 2 * mi * mj * self.products + mj**2 * self.squares[:, 1]
         return np.asarray(0.5 * np.log(np.maximum(squared, 1e-300)))
 
     def derivatives(self, c: Array) -> Array:
-        """∂g/∂c = [(μ_i²|q_i|² − μ_i μ_j q_i·q_j) b_i + (μ_j²|q_j|² − μ_i μ_j q_i·q_j) b_j] / L, (F, n, r)."""
+        """Their derivatives ∂g/∂c = [(μ_i²|q_i|² − μ_i μ_j q_i·q_j) b_i + (μ_j²|q_j|² − μ_i μ_j q_i·q_j) b_j] / L, (F, n, r)."""
         mi, mj = np.exp(c @ self.B[0].T), np.exp(c @ self.B[1].T)
         cross = mi * mj * self.products
         ii, jj = mi**2 * self.squares[:, 0] - cross, mj**2 * self.squares[:, 1] - cross
         L = np.maximum(ii + jj, 1e-300)
         return np.asarray((ii / L)[:, :, None] * self.B[0] + (jj / L)[:, :, None] * self.B[1])
 
+    def rms(self, values: Array) -> Array:
+        """Weighted rms (F,) over the edges of values (F, n)."""
+        total = np.maximum(self.weights.sum(axis=1), 1e-12)
+        return np.asarray(np.sqrt((self.weights * values**2).sum(axis=1) / total))
+
     def frames(self, chosen: slice | Indices) -> "Edges":
         """The same in some of the frames."""
-        return replace(
-            self, squares=self.squares[chosen], products=self.products[chosen], weights=self.weights[chosen]
-        )
+        return replace(self, squares=self.squares[chosen], products=self.products[chosen], weights=self.weights[chosen])
 
     def weighted(self, factor: Array) -> "Edges":
         """The same with weights multiplied by factors (n,) or (F, 1)."""
@@ -158,3 +161,23 @@ def finish_depths(edges: Edges, logs: Array, c: Array, stiffness: Array, bend: f
         c, before = np.where(better[:, None], new, c), np.where(better, after, before)
         damping = np.where(better, np.maximum(damping / 5, 1e-9), damping * 10)
     return c
+
+
+def best_start(edges: Edges, logs: Array, starts: list[Array], stiffness: Array, bend: float, steps: int = 8) -> Array:
+    """For each frame, of coefficients (F, r) finished from several starts those that keep lengths best."""
+    ends = [finish_depths(edges, logs, c, stiffness, bend, steps) for c in starts]
+    costs = np.stack([frame_costs(edges, logs, c, stiffness, bend) for c in ends])
+    return np.stack(ends)[costs.argmin(axis=0), np.arange(len(ends[0]))]
+
+
+def robust_lengths(edges: Edges, g: Array) -> tuple[Array, Array, Array]:
+    """Log lengths (n,) that most frames agree on, from g (F, n); rms disagreement (F,) of frames and (n,) of edges."""
+    h = np.ones((len(g), 1))
+    for _ in range(10):
+        weights = edges.weights * h
+        logs = (weights * g).sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-12)
+        squared = edges.weights * (g - logs) ** 2
+        off = np.sqrt(squared.sum(axis=1) / np.maximum(edges.weights.sum(axis=1), 1e-12))
+        h = (1 / (1 + (off / (2 * np.median(off) + 1e-12)) ** 2) ** 2)[:, None]
+    by_edge = np.sqrt((h * squared).sum(axis=0) / np.maximum((h * edges.weights).sum(axis=0), 1e-12))
+    return logs, off, by_edge

@@ -16,8 +16,7 @@ def maximum_depth(rays: Array, edges: Indices, seen: NDArray[np.bool_]) -> Array
 
         max Σ μ_i^f |q_i^f| / m   subject to   ‖μ_i^f q_i^f − μ_j^f q_j^f‖ ≤ d_ij,   Σ d = n
 
-    Args:
-        seen: (F, n) which edges hold in which frames; a point without any comes out as NaN there.
+    An edge holds in the frames in which it is seen (F, n); a point without any comes out as NaN there.
     """
     F, _, m = rays.shape
     unit = np.linalg.norm(rays, axis=1)
@@ -28,7 +27,11 @@ def maximum_depth(rays: Array, edges: Indices, seen: NDArray[np.bool_]) -> Array
     held[frame, i] = held[frame, j] = True
     base = 1 + 4 * np.arange(cones_count)
     first, second = frame * m + i, frame * m + j
-    rows, columns, values = [np.zeros(n, np.int64), base], [F * m + np.arange(n), F * m + edge], [np.ones(n), -np.ones(cones_count)]
+    rows, columns, values = (
+        [np.zeros(n, np.int64), base],
+        [F * m + np.arange(n), F * m + edge],
+        [np.ones(n), -np.ones(cones_count)],
+    )
     for axis in range(3):
         rows += [base + 1 + axis, base + 1 + axis]
         columns += [first, second]

@@ -1,12 +1,11 @@
 """Robust smooth maps between the images of a bending sheet: tracks without noise, gross errors and gaps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction.basis.mesh import farthest_points
-from reconstruction.mapping.surface import on_one_surface
 from reconstruction.mapping.smooth_field import SmoothField, smooth_field
 
 Array = NDArray[np.float64]
@@ -18,6 +17,8 @@ NODES = 200
 SWEEPS = 8  # of re-weighting
 FIRM = 10.0 ** np.arange(-7, 1.5, 0.5)  # weights of bending that are tried
 GROSS = 8.0  # times the usual residual: not the same point
+FIRST_FIRMNESS = 1e-5
+AGREES = 3.0  # standard deviations
 FINEST = 1e-4  # of the image's RMS radius: no residual is usually smaller
 
 
@@ -28,6 +29,7 @@ class Warps:
     Attributes:
         field: the functions, over the reference image.
         reference: (2, p) the points there, px; NaN where a point was not seen often enough.
+        kept: (p,) the points that the maps come from.
         coefficients: (F, r, 2) of each image, px.
         weights: (F, p) of the observations, 0 where there is none.
         inlier: (F, p) observations that fit.
@@ -37,6 +39,7 @@ class Warps:
 
     field: SmoothField
     reference: Array
+    kept: NDArray[np.bool_]
     coefficients: Array
     weights: Array
     inlier: Visibility
@@ -49,50 +52,65 @@ class Warps:
 
     def variance(self, points: Array) -> Array:
         """Variance (F, n) px² of a coordinate of those: small among visible points, large far from any."""
-        return self._variance(self.field.at(points), self.weights, self.noise_px)
-
-    def fit(self, W: Array, visible: Visibility, points: Array) -> tuple[Array, Array]:
-        """Coefficients (F, r, 2) of more images W (F, 2, p) px, and the variance (F, n) of points (2, n) in them."""
-        B, known = self.functions()
-        pairs = zip(W, visible & known, strict=True)
-        fits = [robust_fit(B, w, h, self.field.stiffness, self.firmness) for w, h in pairs]
-        coefficients, weights, _, noise = (np.stack(parts) for parts in zip(*fits, strict=True))
-        return coefficients, self._variance(self.field.at(points), weights, noise)
-
-    def functions(self) -> tuple[Array, NDArray[np.bool_]]:
-        """Values (p, r) of the functions at all points, 0 where unknown; which are known."""
-        known = np.isfinite(self.reference[0])
-        B = np.zeros((len(known), len(self.field.stiffness)))
-        B[known] = self.field.at(self.reference[:, known])
-        return B, known
-
-    def _variance(self, at: Array, weights: Array, noise: Array) -> Array:
-        B, _ = self.functions()
+        at, B = self.field.at(points), self.functions()
         held = np.diag(self.firmness * self.field.stiffness + 1e-12)
         out = []
-        for h, sigma in zip(weights, noise, strict=True):
+        for h, sigma in zip(self.weights, self.noise_px, strict=True):
             inverse = np.linalg.inv((B.T * h) @ B / h.sum() + held) / h.sum()
             out.append(sigma**2 * ((at @ inverse) * at).sum(axis=1))
         return np.array(out)
 
+    def fit(self, W: Array, visible: Visibility) -> "Warps":
+        """Smooth images of more frames W (F, 2, p) px."""
+        return fitted(self, W, visible, self.firmness)
 
-def warps(W: Array, visible: Visibility) -> Warps:
-    """Smooth images of W (F, 2, p) px, by visibility (F, p)."""
-    reference = reference_image(W, visible)
-    known = np.isfinite(reference[0])
-    reference = np.where(known, reference, np.nan)
+    def frames(self, chosen: Array | NDArray[np.int64]) -> "Warps":
+        """Some of the images."""
+        picked = {name: getattr(self, name)[chosen] for name in ("coefficients", "weights", "inlier", "noise_px")}
+        return replace(self, **picked)
+
+    def agrees(self, W: Array, visible: Visibility) -> NDArray[np.bool_]:
+        """Points (p,), kept or not, that usually are where the maps say, within what is known of the place."""
+        known = np.isfinite(self.reference[0])
+        off = np.linalg.norm(W[:, :, known] - self.images(self.reference[:, known]), axis=1)
+        sigma = np.sqrt(self.variance(self.reference[:, known]) + self.noise_px[:, None] ** 2)
+        usually = median(np.where(visible[:, known], off / sigma, np.nan))
+        found = np.zeros(len(known), bool)
+        found[known] = usually < AGREES
+        return found
+
+    def functions(self) -> Array:
+        """Values (p, r) of the functions at the points kept, 0 at the others."""
+        B = np.zeros((len(self.kept), len(self.field.stiffness)))
+        B[self.kept] = self.field.at(self.reference[:, self.kept])
+        return B
+
+
+def smooth_warps(
+    W: Array, visible: Visibility, kept: NDArray[np.bool_] | None = None, reference: Array | None = None
+) -> Warps:
+    """Smooth images of W (F, 2, p) px, by visibility (F, p), from the points kept (p,), all by default; the reference image if it is known."""
+    F, _, p = W.shape
+    reference = reference_image(W, visible) if reference is None else reference
+    known = np.isfinite(reference[0]) & (True if kept is None else kept)
     nodes = np.flatnonzero(known)[farthest_points(reference[:, known].T, NODES)]
     field = smooth_field(reference[:, nodes], FUNCTIONS)
-    B = np.zeros((W.shape[2], len(field.stiffness)))
-    B[known] = field.at(reference[:, known])
-    seen = visible & known
-    firmness = 1e-5
+    nothing = np.zeros((F, p))
+    empty = Warps(field, reference, known, np.zeros((F, 0, 2)), nothing, nothing > 0, np.ones(F), FIRST_FIRMNESS)
+    B = empty.functions()
+    firmness = FIRST_FIRMNESS
     for _ in range(2):
-        weights = np.stack([robust_fit(B, w, h, field.stiffness, firmness)[1] for w, h in zip(W, seen, strict=True)])
-        firmness = cross_validated(B, W, weights, field.stiffness)
-    fits = [robust_fit(B, w, h, field.stiffness, firmness) for w, h in zip(W, seen, strict=True)]
+        firmness = cross_validated(B, W, fitted(empty, W, visible, firmness).weights, field.stiffness)
+    return fitted(empty, W, visible, firmness)
+
+
+def fitted(warps: Warps, W: Array, visible: Visibility, firmness: float) -> Warps:
+    """Images W (F, 2, p) px made smooth with the functions of other warps."""
+    B = warps.functions()
+    pairs = zip(W, visible & warps.kept, strict=True)
+    fits = [robust_fit(B, w, h, warps.field.stiffness, firmness) for w, h in pairs]
     coefficients, weights, inlier, noise = (np.stack(parts) for parts in zip(*fits, strict=True))
-    return Warps(field, reference, coefficients, weights, inlier, noise, firmness)
+    return replace(warps, coefficients=coefficients, weights=weights, inlier=inlier, noise_px=noise, firmness=firmness)
 
 
 def reference_image(W: Array, visible: Visibility) -> Array:
