@@ -36,7 +36,7 @@ class Keyframes:
         self._apart = np.zeros((0, 0))
 
     def offer(self, frame: int, W: Array, visible: Visibility) -> bool:
-        """Take a frame's points (2, p) px with visibility (p,), if it differs from those there are; whether it was taken."""
+        """Take a frame's points (2, p) px with visibility (p,), if they differ from those there are; whether it was."""
         if visible.mean() < FEWEST_SEEN:
             return False
         W = np.where(visible, W, 0.0)

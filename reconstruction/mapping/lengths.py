@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+HOPELESS = 1e4  # damping with which no step helps
+
 
 @dataclass(frozen=True)
 class Edges:
@@ -35,7 +37,7 @@ class Edges:
         return np.asarray(0.5 * np.log(np.maximum(squared, 1e-300)))
 
     def derivatives(self, c: Array) -> Array:
-        """Their derivatives ∂g/∂c = [(μ_i²|q_i|² − μ_i μ_j q_i·q_j) b_i + (μ_j²|q_j|² − μ_i μ_j q_i·q_j) b_j] / L, (F, n, r)."""
+        """Their derivatives (F, n, r) by c: [(μ_i²|q_i|² − μ_iμ_j q_i·q_j) b_i + (μ_j²|q_j|² − μ_iμ_j q_i·q_j) b_j] / L."""
         mi, mj = np.exp(c @ self.B[0].T), np.exp(c @ self.B[1].T)
         cross = mi * mj * self.products
         ii, jj = mi**2 * self.squares[:, 0] - cross, mj**2 * self.squares[:, 1] - cross
@@ -109,15 +111,17 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
     (F, r), n = c.shape, len(edges.ends)
     w = edges.weights * F / edges.weights.sum()
     root = w / np.sqrt(np.maximum(w.sum(axis=0), 1e-12))
+    c = c - c[:, :1].mean() * np.eye(r)[0]
     before, damping = cost(edges, c, stiffness, solver), 1e-3
     for _ in range(solver.steps):
         J = edges.derivatives(c)
         blocks = J.transpose(0, 2, 1) @ (w[:, :, None] * J) + np.diag(solver.bend * stiffness)
         K = root[:, :, None] * J
         g = gradient(edges, c, stiffness, solver)
+        g[:, 0] -= g[:, 0].mean()  # not along the scale, which is held
         diagonal = np.einsum("frr->fr", blocks) - (K**2).sum(axis=1)
         right = np.concatenate([g[:, :, None], K.transpose(0, 2, 1)], axis=2)
-        for _ in range(8):
+        while damping < HOPELESS:
             D = blocks + (damping * diagonal + 1e-9)[:, :, None] * np.eye(r)
             solved = np.linalg.solve(D, right)
             through = np.tensordot(K, solved, axes=([0, 2], [0, 1]))
@@ -127,11 +131,11 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
             after = cost(edges, new, stiffness, solver)
             if after < before:
                 break
-            damping *= 5
+            damping *= 10
         else:
             break
         settled = before - after < solver.enough * abs(before)
-        c, before, damping = new, after, max(damping / 5, 1e-9)
+        c, before, damping = new, after, max(damping / 10, 1e-6)
         if settled:
             break
     return c
@@ -167,7 +171,7 @@ def best_start(edges: Edges, logs: Array, starts: list[Array], stiffness: Array,
     """For each frame, of coefficients (F, r) finished from several starts those that keep lengths best."""
     ends = [finish_depths(edges, logs, c, stiffness, bend, steps) for c in starts]
     costs = np.stack([frame_costs(edges, logs, c, stiffness, bend) for c in ends])
-    return np.stack(ends)[costs.argmin(axis=0), np.arange(len(ends[0]))]
+    return np.asarray(np.stack(ends)[costs.argmin(axis=0), np.arange(len(ends[0]))])
 
 
 def robust_lengths(edges: Edges, g: Array) -> tuple[Array, Array, Array]:

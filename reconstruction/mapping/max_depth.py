@@ -1,6 +1,6 @@
 """Convex start for a sheet that keeps its lengths: the deepest shapes (Chhatkuli et al., CVPR 2016)."""
 
-import clarabel
+import clarabel  # type: ignore[import-untyped]
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray

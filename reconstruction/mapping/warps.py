@@ -89,7 +89,10 @@ class Warps:
 def smooth_warps(
     W: Array, visible: Visibility, kept: NDArray[np.bool_] | None = None, reference: Array | None = None
 ) -> Warps:
-    """Smooth images of W (F, 2, p) px, by visibility (F, p), from the points kept (p,), all by default; the reference image if it is known."""
+    """Smooth images of W (F, 2, p) px, by visibility (F, p).
+
+    From the points kept (p,), all by default; over the reference image (2, p), if it is known already.
+    """
     F, _, p = W.shape
     reference = reference_image(W, visible) if reference is None else reference
     known = np.isfinite(reference[0]) & (True if kept is None else kept)
