@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 FACTORS = (0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8)  # of the focal length that are tried first
 CLOSER = (0.93, 1.0, 1.08)
-RISE = 1.15  # times the least change of length, to which it must rise on both sides
+RISE = 1.5  # times the least change of length, to which it must rise on both sides
 
 
 @dataclass(frozen=True)
