@@ -1,0 +1,114 @@
+"""A few keyframes of a whole video: those whose images differ most, chosen while it runs, in bounded memory."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Visibility = NDArray[np.bool_]
+
+KEYFRAMES = 30
+FEWEST_SHARED = 12  # points that two frames must share to be compared
+FEWEST_SEEN = 0.25  # of the points a frame must show
+SWEEPS = 3  # of re-weighting, against gross errors
+
+
+class Keyframes:
+    """Keeps at most so many frames, spread by image configuration: farthest points on-line, by merging the nearest pair.
+
+    A frame whose nearest keyframe is nearer than the nearest two keyframes are to each other is not taken; else it is,
+    and when there are too many the newer of the nearest two goes. Distances are in units of the image's RMS radius,
+    so that nothing depends on units.
+
+    Args:
+        capacity: most frames kept.
+
+    Attributes:
+        frames: their numbers, ascending.
+        version: grows with every frame taken.
+    """
+
+    def __init__(self, capacity: int = KEYFRAMES) -> None:
+        self.capacity = capacity
+        self.frames: list[int] = []
+        self.version = 0
+        self._W: list[Array] = []
+        self._visible: list[Visibility] = []
+        self._apart = np.zeros((0, 0))
+
+    def offer(self, frame: int, W: Array, visible: Visibility) -> bool:
+        """Take a frame's points (2, p) px with visibility (p,), if they differ from those there are; whether it was."""
+        if visible.mean() < FEWEST_SEEN:
+            return False
+        W = np.where(visible, W, 0.0)
+        apart = self.differences(W, visible)
+        if len(self.frames) >= self.capacity and apart.min() <= nearest_pair(self._apart)[2]:
+            return False
+        n = len(self.frames)
+        grown = np.zeros((n + 1, n + 1))
+        grown[:n, :n], grown[n, :n], grown[:n, n] = self._apart, apart, apart
+        self._apart = grown
+        self.frames.append(frame)
+        self._W.append(W)
+        self._visible.append(visible.copy())
+        self.version += 1
+        if len(self.frames) > self.capacity:
+            self._drop(nearest_pair(self._apart)[1])
+        return True
+
+    def differences(self, W: Array, visible: Visibility) -> Array:
+        """How much an image (2, p) differs from each keyframe, see `difference`."""
+        if not self._W:
+            return np.zeros(0)
+        return difference(W, visible, np.stack(self._W), np.stack(self._visible))
+
+    def spread(self, count: int | None = None) -> tuple[Array, Visibility, NDArray[np.int64]]:
+        """Points (F, 2, p) px, NaN where not visible, visibility (F, p) and numbers (F,), most different ones first."""
+        order = farthest_first(self._apart, count or len(self.frames))
+        W, visible = np.stack(self._W)[order], np.stack(self._visible)[order]
+        return np.where(visible[:, None], W, np.nan), visible, np.array(self.frames, np.int64)[order]
+
+    def _drop(self, k: int) -> None:
+        del self.frames[k], self._W[k], self._visible[k]
+        self._apart = np.delete(np.delete(self._apart, k, axis=0), k, axis=1)
+
+
+def difference(W: Array, visible: Visibility, others: Array, others_visible: Visibility) -> Array:
+    """Robust RMS difference (F,) of an image (2, p) from others (F, 2, p) beyond a shift, over the image's RMS radius.
+
+    Infinite where they share too few points.
+    """
+    both = (others_visible & visible).astype(np.float64)
+    moved = (W - others) * both[:, None]
+    h = both
+    for _ in range(SWEEPS):
+        total = np.maximum(h.sum(axis=1), 1e-12)
+        shift = (moved * h[:, None]).sum(axis=2) / total[:, None]
+        squared = ((moved - shift[:, :, None]) ** 2).sum(axis=1)
+        usual = (h * squared).sum(axis=1) / total
+        h = both / (1 + squared / (9 * usual[:, None] + 1e-300)) ** 2
+    apart = np.sqrt((h * squared).sum(axis=1) / np.maximum(h.sum(axis=1), 1e-12))
+    size = np.sqrt(np.var(W[:, visible], axis=1).sum())
+    return np.where(both.sum(axis=1) >= FEWEST_SHARED, apart / max(float(size), 1e-300), np.inf)
+
+
+def nearest_pair(apart: Array) -> tuple[int, int, float]:
+    """The two nearest of things so far apart (F, F), the newer second, and their distance; infinite if there are none."""
+    if len(apart) < 2:
+        return 0, 0, np.inf
+    i, j = np.triu_indices(len(apart), 1)
+    k = int(apart[i, j].argmin())
+    return int(i[k]), int(j[k]), float(apart[i[k], j[k]])
+
+
+def farthest_first(apart: Array, count: int) -> NDArray[np.int64]:
+    """Order of things so far apart (F, F): the one farthest from all others, then always the farthest from those before."""
+    finite = np.minimum(apart, 10 * apart[np.isfinite(apart)].max(initial=1e-12))
+    order = [int(finite.sum(axis=1).argmax())]
+    near = finite[order[0]].copy()
+    near[order[0]] = -1.0
+    while len(order) < min(count, len(apart)):
+        k = int(near.argmax())
+        order.append(k)
+        near = np.minimum(near, finite[k])
+        near[k] = -1.0
+    return np.array(order)

@@ -1,0 +1,187 @@
+"""Log lengths of edges between points along rays, and the depths that keep them the same in all frames."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+HOPELESS = 1e4  # damping with which no step helps
+
+
+@dataclass(frozen=True)
+class Edges:
+    """n edges between m points seen along rays q in F frames; depths are exp(B c_f), B smooth functions, c_f (r,).
+
+    Attributes:
+        ends: (n, 2) point indices.
+        squares: (F, 2, n) |q_i|², |q_j|².
+        products: (F, n) q_i · q_j.
+        B: (2, n, r) the functions at both ends.
+        weights: (F, n) how well each length is seen, 0 to 1.
+    """
+
+    ends: Indices
+    squares: Array
+    products: Array
+    B: Array
+    weights: Array
+
+    def log_lengths(self, c: Array) -> Array:
+        """The logs g = ½ log(μ_i²|q_i|² − 2 μ_i μ_j q_i·q_j + μ_j²|q_j|²) (F, n) at c (F, r)."""
+        mi, mj = np.exp(c @ self.B[0].T), np.exp(c @ self.B[1].T)
+        squared = mi**2 * self.squares[:, 0] - 2 * mi * mj * self.products + mj**2 * self.squares[:, 1]
+        return np.asarray(0.5 * np.log(np.maximum(squared, 1e-300)))
+
+    def derivatives(self, c: Array) -> Array:
+        """Their derivatives (F, n, r) by c: [(μ_i²|q_i|² − μ_iμ_j q_i·q_j) b_i + (μ_j²|q_j|² − μ_iμ_j q_i·q_j) b_j] / L."""
+        mi, mj = np.exp(c @ self.B[0].T), np.exp(c @ self.B[1].T)
+        cross = mi * mj * self.products
+        ii, jj = mi**2 * self.squares[:, 0] - cross, mj**2 * self.squares[:, 1] - cross
+        L = np.maximum(ii + jj, 1e-300)
+        return np.asarray((ii / L)[:, :, None] * self.B[0] + (jj / L)[:, :, None] * self.B[1])
+
+    def rms(self, values: Array) -> Array:
+        """Weighted rms (F,) over the edges of values (F, n)."""
+        total = np.maximum(self.weights.sum(axis=1), 1e-12)
+        return np.asarray(np.sqrt((self.weights * values**2).sum(axis=1) / total))
+
+    def frames(self, chosen: slice | Indices) -> "Edges":
+        """The same in some of the frames."""
+        return replace(self, squares=self.squares[chosen], products=self.products[chosen], weights=self.weights[chosen])
+
+    def weighted(self, factor: Array) -> "Edges":
+        """The same with weights multiplied by factors (n,) or (F, 1)."""
+        return replace(self, weights=self.weights * factor)
+
+
+def edges_of(rays: Array, ends: Indices, B: Array, weights: Array) -> Edges:
+    """Edges (n, 2) between points with rays (F, 3, m) and functions B (m, r), weights (F, n)."""
+    i, j = ends.T
+    squares = (rays**2).sum(axis=1)
+    products = (rays[:, :, i] * rays[:, :, j]).sum(axis=1)
+    return Edges(ends, np.stack([squares[:, i], squares[:, j]], axis=1), products, np.stack([B[i], B[j]]), weights)
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How depths are adjusted."""
+
+    bend: float = 1e-2
+    """λ: weight of the depth field's bending."""
+    grow: float = 3e-4
+    """η: pull to short lengths, against shapes that grow without end."""
+    steps: int = 30
+    """At most so many Levenberg-Marquardt steps."""
+    enough: float = 1e-3
+    """Relative decrease of the cost that ends them."""
+
+
+def mean_log_lengths(edges: Edges, g: Array) -> Array:
+    """Weighted mean over frames (n,) of log lengths g (F, n)."""
+    total = edges.weights.sum(axis=0)
+    return np.asarray((edges.weights * g).sum(axis=0) / np.maximum(total, 1e-12))
+
+
+def cost(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> float:
+    """1/N Σ w (g − mean_f g)² + 2η/N Σ w g + λ Σ_f c_fᵀ diag(stiffness) c_f, N = Σ w / F."""
+    g = edges.log_lengths(c)
+    d = g - mean_log_lengths(edges, g)
+    n = edges.weights.sum() / len(c)
+    bend = solver.bend * float((stiffness * c**2).sum())
+    return float((edges.weights * (d**2 + 2 * solver.grow * g)).sum() / n) + bend
+
+
+def gradient(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> Array:
+    """Half the derivative (F, r) of the cost."""
+    g = edges.log_lengths(c)
+    pull = edges.weights * (g - mean_log_lengths(edges, g) + solver.grow) * len(c) / edges.weights.sum()
+    return np.asarray((pull[:, None] @ edges.derivatives(c))[:, 0] + solver.bend * stiffness * c)
+
+
+def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> Array:
+    """Coefficients (F, r) for which every edge has the same, unknown, length in all frames; mean of c_f0 is 0.
+
+    The frames are coupled only through n mean lengths: the normal matrix is one block a frame less a matrix of rank n,
+    and is inverted as such (Woodbury).
+    """
+    (F, r), n = c.shape, len(edges.ends)
+    w = edges.weights * F / edges.weights.sum()
+    root = w / np.sqrt(np.maximum(w.sum(axis=0), 1e-12))
+    c = c - c[:, :1].mean() * np.eye(r)[0]
+    before, damping = cost(edges, c, stiffness, solver), 1e-3
+    for _ in range(solver.steps):
+        J = edges.derivatives(c)
+        blocks = J.transpose(0, 2, 1) @ (w[:, :, None] * J) + np.diag(solver.bend * stiffness)
+        K = root[:, :, None] * J
+        g = gradient(edges, c, stiffness, solver)
+        g[:, 0] -= g[:, 0].mean()  # not along the scale, which is held
+        diagonal = np.einsum("frr->fr", blocks) - (K**2).sum(axis=1)
+        right = np.concatenate([g[:, :, None], K.transpose(0, 2, 1)], axis=2)
+        while damping < HOPELESS:
+            D = blocks + (damping * diagonal + 1e-9)[:, :, None] * np.eye(r)
+            solved = np.linalg.solve(D, right)
+            through = np.tensordot(K, solved, axes=([0, 2], [0, 1]))
+            shared = scipy.linalg.solve(np.eye(n) - through[:, 1:], through[:, 0], assume_a="sym", check_finite=False)
+            new = c - solved[:, :, 0] - solved[:, :, 1:] @ shared
+            new[:, 0] -= new[:, 0].mean()
+            after = cost(edges, new, stiffness, solver)
+            if after < before:
+                break
+            damping *= 10
+        else:
+            break
+        settled = before - after < solver.enough * abs(before)
+        c, before, damping = new, after, max(damping / 10, 1e-6)
+        if settled:
+            break
+    return c
+
+
+def frame_costs(edges: Edges, logs: Array, c: Array, stiffness: Array, bend: float) -> Array:
+    """Cost (F,) of each frame by itself against known log lengths (n,)."""
+    off = (edges.weights * (edges.log_lengths(c) - logs) ** 2).sum(axis=1)
+    return np.asarray(off / np.maximum(edges.weights.sum(axis=1), 1e-12) + bend * (stiffness * c**2).sum(axis=1))
+
+
+def finish_depths(edges: Edges, logs: Array, c: Array, stiffness: Array, bend: float, steps: int = 6) -> Array:
+    """Coefficients (F, r) of frames, each by itself, with known log lengths (n,), started from c."""
+    w = edges.weights / np.maximum(edges.weights.sum(axis=1), 1e-12)[:, None]
+    held = bend * stiffness
+    before = frame_costs(edges, logs, c, stiffness, bend)
+    damping = np.full(len(c), 1e-3)
+    for _ in range(steps):
+        J = edges.derivatives(c)
+        wJ = w[:, :, None] * J
+        H = J.transpose(0, 2, 1) @ wJ + np.diag(held)
+        right = ((edges.log_lengths(c) - logs)[:, None] @ wJ)[:, 0] + held * c
+        H += (np.einsum("frr->fr", H) * damping[:, None] + 1e-9)[:, :, None] * np.eye(c.shape[1])
+        new = c - np.linalg.solve(H, right[:, :, None])[:, :, 0]
+        after = frame_costs(edges, logs, new, stiffness, bend)
+        better = after < before
+        c, before = np.where(better[:, None], new, c), np.where(better, after, before)
+        damping = np.where(better, np.maximum(damping / 5, 1e-9), damping * 10)
+    return c
+
+
+def best_start(edges: Edges, logs: Array, starts: list[Array], stiffness: Array, bend: float, steps: int = 8) -> Array:
+    """For each frame, of coefficients (F, r) finished from several starts those that keep lengths best."""
+    ends = [finish_depths(edges, logs, c, stiffness, bend, steps) for c in starts]
+    costs = np.stack([frame_costs(edges, logs, c, stiffness, bend) for c in ends])
+    return np.asarray(np.stack(ends)[costs.argmin(axis=0), np.arange(len(ends[0]))])
+
+
+def robust_lengths(edges: Edges, g: Array) -> tuple[Array, Array, Array]:
+    """Log lengths (n,) that most frames agree on, from g (F, n); rms disagreement (F,) of frames and (n,) of edges."""
+    h = np.ones((len(g), 1))
+    for _ in range(10):
+        weights = edges.weights * h
+        logs = (weights * g).sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-12)
+        squared = edges.weights * (g - logs) ** 2
+        off = np.sqrt(squared.sum(axis=1) / np.maximum(edges.weights.sum(axis=1), 1e-12))
+        h = (1 / (1 + (off / (2 * np.median(off) + 1e-12)) ** 2) ** 2)[:, None]
+    by_edge = np.sqrt((h * squared).sum(axis=0) / np.maximum((h * edges.weights).sum(axis=0), 1e-12))
+    return logs, off, by_edge

@@ -1,0 +1,87 @@
+"""Well-spread points of a sheet in its keyframes, the edges between them, and how well each length is seen."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction.basis.mesh import farthest_points
+from reconstruction.camera import Camera
+from reconstruction.mapping.lengths import Edges, edges_of
+from reconstruction.mapping.smooth_field import SmoothField
+from reconstruction.mapping.warps import Warps
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+NODES = 80
+NEIGHBOURS = 6
+USUAL_STRAIN = 0.01  # of lengths that are seen exactly
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Well-spread points of a sheet, where F keyframes see them.
+
+    Attributes:
+        reference: (2, m) in the reference image, px.
+        images: (F, 2, m) px, smoothed.
+        variance: (F, m) of a coordinate there, px².
+        ends: (n, 2) edges between neighbours.
+    """
+
+    reference: Array
+    images: Array
+    variance: Array
+    ends: Indices
+
+
+def nodes_of(warps: Warps) -> Nodes:
+    """Nodes of a sheet from its smooth images."""
+    known = np.flatnonzero(warps.kept)
+    at = warps.reference[:, known[farthest_points(warps.reference[:, known].T, NODES)]]
+    images = warps.images(at)
+    return Nodes(at, images, warps.variance(at), neighbours(images, NEIGHBOURS))
+
+
+def nodes_in(warps: Warps, nodes: Nodes) -> Nodes:
+    """The same nodes in other images."""
+    return replace(nodes, images=warps.images(nodes.reference), variance=warps.variance(nodes.reference))
+
+
+def rays_of(images: Array, camera: Camera) -> Array:
+    """Rays (F, 3, m), third coordinate 1, of image points (F, 2, m) px."""
+    xy = (images - camera.center_px[:, None]) / camera.focal_px
+    return np.concatenate([xy, np.ones_like(xy[:, :1])], axis=1)
+
+
+def neighbours(images: Array, count: int) -> Indices:
+    """Edges (n, 2) of points that stay close in all images (F, 2, m): so many nearest ones of each."""
+    size = np.sqrt(np.var(images, axis=2).sum(axis=1))
+    scaled = images / size[:, None, None]
+    squares = (scaled**2).sum(axis=1)
+    apart = squares[:, :, None] + squares[:, None, :] - 2 * scaled.transpose(0, 2, 1) @ scaled
+    farthest: Array = apart.max(axis=0)
+    np.fill_diagonal(farthest, np.inf)
+    near = np.argsort(farthest, axis=1)[:, : min(count, len(farthest) - 1)]
+    pairs = np.stack([np.repeat(np.arange(len(near)), near.shape[1]), near.ravel()], axis=1)
+    found: Indices = np.unique(np.sort(pairs, axis=1), axis=0)
+    return found
+
+
+def edges_between(nodes: Nodes, field: SmoothField, camera: Camera) -> Edges:
+    """Edges weighted by how well each length is seen: its variance by noise against the usual strain."""
+    i, j = nodes.ends.T
+    longest = np.linalg.norm(nodes.images[:, :, i] - nodes.images[:, :, j], axis=1).max(axis=0)
+    by_noise = (nodes.variance[:, i] + nodes.variance[:, j]) / np.maximum(longest, 1e-12) ** 2
+    rays = rays_of(nodes.images, camera)
+    return edges_of(rays, nodes.ends, field.at(nodes.reference), 1 / (1 + by_noise / USUAL_STRAIN**2))
+
+
+def nearest(images: Array, others: Array) -> Indices:
+    """(F, G) indices of other images (G, 2, m), most alike to each of the images (F, 2, m) but for its place first."""
+    a, b = (x - x.mean(axis=2, keepdims=True) for x in (images, others))
+    a, b = a.reshape(len(a), -1), b.reshape(len(b), -1)
+    squared = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T
+    order: Indices = np.argsort(squared, axis=1)
+    return order

@@ -1,0 +1,96 @@
+"""Whether a sheet can be trusted: its two halves, and the focal length under which it keeps its lengths best."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction.evaluation import e3d
+from reconstruction.mapping.isometric import SOLVER, adjust, again
+from reconstruction.mapping.isometric_sheet import IsometricSheet
+from reconstruction.mapping.lengths import mean_log_lengths
+from reconstruction.mapping.nodes import edges_between
+
+Array = NDArray[np.float64]
+
+FACTORS = (0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8)  # of the focal length that are tried first
+CLOSER = (0.93, 1.0, 1.08)
+RISE = 1.5  # times the least change of length, to which it must rise on both sides
+
+
+@dataclass(frozen=True)
+class FocalSearch:
+    """What a sheet says about the focal length.
+
+    Attributes:
+        focal_px: under which lengths change least.
+        known: whether they change clearly more on both sides.
+        tried_px: (k,) focal lengths, ascending.
+        strain_rms: (k,) change of length under each.
+    """
+
+    focal_px: float
+    known: bool
+    tried_px: Array
+    strain_rms: Array
+
+
+def halves_disagreement(sheet: IsometricSheet) -> Array:
+    """Relative difference (F,) in each keyframe of the shapes that the lengths of two disjoint halves give.
+
+    All keyframes are finished with either half's lengths. Needs 6 keyframes.
+    """
+    warps, half = sheet.warps, np.arange(len(sheet.coefficients))
+    a, b = (adjust(warps.frames(half[k::2]), sheet.camera, rounds=2).in_frames(warps).shapes() for k in (0, 1))
+    known = sheet.warps.kept
+    return e3d(a[:, :, known], b[:, :, known])
+
+
+def with_focal(sheet: IsometricSheet, focal_px: float) -> IsometricSheet:
+    """The same keyframes under another focal length, adjusted from the shapes there are."""
+    camera = replace(sheet.camera, focal_px=focal_px)
+    seen = edges_between(sheet.nodes, sheet.field, camera)
+    c, factor = again(sheet.nodes, seen, seen.weighted(sheet.edge_weights), sheet.coefficients, sheet.field.stiffness)
+    edges = seen.weighted(factor)
+    g = edges.log_lengths(c)
+    logs = mean_log_lengths(edges, g)
+    return replace(
+        sheet,
+        coefficients=c,
+        log_lengths=logs,
+        edge_weights=factor,
+        strain=edges.rms(g - logs),
+        bend=SOLVER.bend,
+        camera=camera,
+    )
+
+
+def focal(sheet: IsometricSheet) -> FocalSearch:
+    """Focal length by the change of length: least at the true one; the parabola through the three least, in log focal."""
+    tried: dict[float, float] = {}
+
+    def look(focal_px: float, start: IsometricSheet) -> IsometricSheet:
+        found = with_focal(start, focal_px)
+        tried[focal_px] = found.strain_rms
+        return found
+
+    f, middle = sheet.camera.focal_px, FACTORS.index(1.0)
+    here = look(f, sheet)
+    for side in (FACTORS[middle + 1 :], FACTORS[:middle][::-1]):
+        at = here  # outwards from the middle, each from the one before
+        for factor in side:
+            at = look(f * factor, at)
+    for factor in CLOSER:
+        best = min(tried, key=lambda k: tried[k])
+        if best * factor not in tried:
+            look(best * factor, here)
+    focals = np.array(sorted(tried))
+    strains = np.array([tried[k] for k in focals])
+    k = int(strains.argmin())
+    known = min(strains[:k].max(initial=0.0), strains[k + 1 :].max(initial=0.0)) > RISE * strains[k]
+    if 0 < k < len(focals) - 1:
+        x, y = np.log(focals[k - 1 : k + 2]), strains[k - 1 : k + 2] ** 2
+        a, b, _ = np.polyfit(x - x[1], y, 2)
+        lowest = float(np.clip(-b / (2 * a), x[0] - x[1], x[2] - x[1])) if a > 0 else 0.0
+        return FocalSearch(float(np.exp(x[1] + lowest)), bool(known), focals, strains)
+    return FocalSearch(float(focals[k]), False, focals, strains)

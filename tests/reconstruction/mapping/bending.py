@@ -1,0 +1,40 @@
+"""Sheets that bend and keep every length exactly, seen by a perspective camera."""
+
+import numpy as np
+
+from reconstruction.camera import Camera
+
+CAMERA = Camera(600.0, np.array([320.0, 240.0]))
+
+
+def bent(uv: np.ndarray, direction: float, slope: np.ndarray, grid: np.ndarray) -> np.ndarray:
+    """Points (3, p) of the sheet's (2, p), bent along a direction: slope (k,) in radians along arc length grid (k,)."""
+    c, s = np.cos(direction), np.sin(direction)
+    along, across = c * uv[0] + s * uv[1], -s * uv[0] + c * uv[1]
+    step = grid[1] - grid[0]
+    x = np.concatenate([[0.0], np.cumsum(np.cos((slope[1:] + slope[:-1]) / 2)) * step])
+    z = np.concatenate([[0.0], np.cumsum(np.sin((slope[1:] + slope[:-1]) / 2)) * step])
+    x, z = np.interp(along, grid, x - x.mean()), np.interp(along, grid, z - z.mean())
+    return np.stack([c * x - s * across, s * x + c * across, z])
+
+
+def turned(x: float, y: float) -> np.ndarray:
+    """Rotation about y, then x."""
+    cx, sx, cy, sy = np.cos(x), np.sin(x), np.cos(y), np.sin(y)
+    return np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]]) @ np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+
+
+def waving_sheet(
+    rng: np.random.Generator, frames: int = 12, points: int = 150, amplitude: float = 0.5, noise_px: float = 0.1
+) -> tuple[np.ndarray, np.ndarray]:
+    """Images (F, 2, p) px and true shapes (F, 3, p) of a sheet 1.2 wide at a distance of 3, never flat."""
+    uv = np.stack([rng.uniform(-0.6, 0.6, points), rng.uniform(-0.45, 0.45, points)])
+    direction, phases, grid = rng.uniform(0, np.pi), rng.uniform(0, 2 * np.pi, 5), np.linspace(-0.8, 0.8, 800)
+    shapes = []
+    for w in 2 * np.pi * np.arange(frames) / frames:
+        slope = amplitude * (np.sin(2 * np.pi * grid / 1.2 + w + phases[0]) + 0.4 * np.sin(2 * w + phases[1]))
+        R = turned(0.45 * np.sin(w + phases[2]), 0.5 * np.sin(2 * w + phases[3]))
+        shape = R @ bent(uv, direction + 0.5 * np.sin(w + phases[4]), slope, grid)
+        shapes.append(shape + np.array([0.1 * np.sin(w), 0.1 * np.cos(w), 3.0])[:, None])
+    S = np.array(shapes)
+    return CAMERA.project(S) + noise_px * rng.standard_normal((frames, 2, points)), S

@@ -1,0 +1,111 @@
+"""A sheet of unknown shape from its keyframes: accuracy, units, gaps, gross errors, strays, focal length, halves."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from reconstruction import ReconstructionError
+from reconstruction.camera import Camera
+from reconstruction.evaluation import e3d
+from reconstruction.mapping.isometric import sheet
+from reconstruction.mapping.isometric_sheet import IsometricSheet
+from reconstruction.mapping.sheet_evidence import focal, halves_disagreement
+from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
+
+SEEN = np.ones((12, 150), bool)
+
+
+@cache
+def waving() -> tuple[np.ndarray, np.ndarray, IsometricSheet]:
+    W, S = waving_sheet(np.random.default_rng(5))
+    return W, S, sheet(W, SEEN, CAMERA)
+
+
+def error(found: IsometricSheet, truth: np.ndarray) -> float:
+    return float(e3d(found.shapes(), truth).mean())
+
+
+def test_shapes_come_out_of_the_images_alone() -> None:
+    _, S, found = waving()
+    assert error(found, S) < 0.02
+    assert found.strain_rms < 0.01
+    assert found.warps.kept.all()
+
+
+def test_lengths_are_those_of_the_sheet() -> None:
+    _, S, found = waving()
+    place = found.nodes.reference
+    nodes = np.linalg.norm(found.warps.reference[:, :, None] - place[:, None], axis=0).argmin(axis=0)
+    i, j = nodes[found.nodes.ends].T
+    true = np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)).mean(axis=0)
+    ratio = found.log_lengths - true
+    assert np.std(ratio - np.median(ratio)) < 0.05
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+def test_units_of_the_image_do_not_matter(unit: float) -> None:
+    W, _, found = waving()
+    camera = Camera(CAMERA.focal_px * unit, CAMERA.center_px * unit)
+    again = sheet(W * unit, SEEN, camera)
+    np.testing.assert_allclose(again.shapes(), found.shapes(), rtol=1e-5)
+
+
+def test_frames_that_were_no_keyframes_are_finished_with_the_lengths_known() -> None:
+    W, S, _ = waving()
+    found = sheet(W[::2], SEEN[::2], CAMERA)
+    rest = found.finish(W[1::2], SEEN[1::2])
+    assert error(rest, S[1::2]) < 0.05
+
+
+def test_gaps_and_gross_errors_are_lived_with() -> None:
+    rng = np.random.default_rng(3)
+    W, S = waving_sheet(rng, frames=20, points=250, noise_px=0.5)
+    visible = rng.random((20, 250)) > 0.4
+    gross = rng.random((20, 250)) < 0.1
+    W = np.where(gross[:, None], rng.uniform(100, 400, W.shape), W)
+    found = sheet(np.where(visible[:, None], W, np.nan), visible, CAMERA)
+    assert error(found, S) < 0.05
+    assert found.warps.inlier[gross & visible].mean() < 0.1
+
+
+def test_points_of_something_else_are_left_out() -> None:
+    rng = np.random.default_rng(4)
+    W, S = waving_sheet(rng, frames=15, points=200)
+    still = np.stack([W[0, 0].min() - rng.uniform(2, 30, 14), rng.uniform(200, 300, 14)])
+    W = np.concatenate([W, np.broadcast_to(still, (15, 2, 14)) + 0.1 * rng.standard_normal((15, 2, 14))], axis=2)
+    found = sheet(W, np.ones((15, 214), bool), CAMERA)
+    assert found.warps.kept[200:].mean() < 0.5
+    assert found.warps.kept[:200].mean() > 0.8
+    assert float(e3d(found.shapes()[:, :, :200], S).mean()) < 0.03
+
+
+def test_part_that_is_out_of_sight_does_not_spoil_the_rest() -> None:
+    rng = np.random.default_rng(6)
+    W, S = waving_sheet(rng, frames=15, points=200)
+    visible = np.ones((15, 200), bool)
+    visible[3:6] = W[0, 0] < np.median(W[0, 0])
+    found = sheet(np.where(visible[:, None], W, np.nan), visible, CAMERA)
+    whole = visible.all(axis=1)
+    assert float(e3d(found.shapes()[whole], S[whole]).mean()) < 0.03
+
+
+def test_lengths_hold_the_focal_length() -> None:
+    W, _, _ = waving()
+    wrong = replace(CAMERA, focal_px=1.25 * CAMERA.focal_px)
+    search = focal(sheet(W, SEEN, wrong))
+    assert search.known
+    assert search.focal_px == pytest.approx(CAMERA.focal_px, rel=0.08)
+
+
+def test_halves_agree_where_the_sheet_is_good() -> None:
+    assert np.median(halves_disagreement(waving()[2])) < 0.04
+
+
+def test_what_cannot_be_done_is_said() -> None:
+    W, _, _ = waving()
+    with pytest.raises(ReconstructionError, match="perspective"):
+        sheet(W, SEEN, Camera())
+    with pytest.raises(ReconstructionError, match="3 keyframes"):
+        sheet(W[:2], SEEN[:2], CAMERA)

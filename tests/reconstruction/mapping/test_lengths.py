@@ -1,0 +1,71 @@
+"""Log lengths along rays: derivatives, scale, and that the adjustment goes down to a minimum."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from reconstruction.mapping.lengths import Edges, Solver, adjust_depths, cost, edges_of, finish_depths, gradient
+from reconstruction.mapping.smooth_field import smooth_field
+
+SEEDS = st.integers(0, 10_000).map(np.random.default_rng)
+F, M, R = 4, 25, 8
+
+
+def some_edges(rng: np.random.Generator) -> tuple[Edges, np.ndarray, np.ndarray]:
+    """Edges, stiffness, coefficients."""
+    xy = rng.uniform(-0.4, 0.4, (2, M))
+    field = smooth_field(xy, R)
+    rays = np.concatenate([xy + 0.05 * rng.standard_normal((F, 2, M)), np.ones((F, 1, M))], axis=1)
+    ends = np.unique(np.sort([rng.choice(M, 2, replace=False) for _ in range(70)], axis=1), axis=0)
+    edges = edges_of(rays, ends, field.at(xy), rng.uniform(0.1, 1, (F, len(ends))))
+    return edges, field.stiffness, 0.1 * rng.standard_normal((F, R))
+
+
+@settings(max_examples=10, deadline=None)
+@given(rng=SEEDS)
+def test_derivatives_of_log_lengths_are_exact(rng: np.random.Generator) -> None:
+    edges, _, c = some_edges(rng)
+    step, d = 1e-6, rng.standard_normal(c.shape)
+    numeric = (edges.log_lengths(c + step * d) - edges.log_lengths(c - step * d)) / (2 * step)
+    np.testing.assert_allclose(np.einsum("fnr,fr->fn", edges.derivatives(c), d), numeric, rtol=1e-5, atol=1e-6)
+
+
+@settings(max_examples=10, deadline=None)
+@given(rng=SEEDS)
+def test_gradient_is_half_the_derivative_of_the_cost(rng: np.random.Generator) -> None:
+    edges, stiffness, c = some_edges(rng)
+    solver, step, d = Solver(), 1e-6, rng.standard_normal(c.shape)
+    numeric = cost(edges, c + step * d, stiffness, solver) - cost(edges, c - step * d, stiffness, solver)
+    exact = 2 * float((gradient(edges, c, stiffness, solver) * d).sum())
+    np.testing.assert_allclose(exact, numeric / (2 * step), rtol=1e-5, atol=1e-7)
+
+
+@settings(max_examples=10, deadline=None)
+@given(rng=SEEDS, scale=st.floats(-3, 3))
+def test_scale_of_all_depths_adds_to_every_log_length(rng: np.random.Generator, scale: float) -> None:
+    edges, _, c = some_edges(rng)
+    larger = c + scale * np.eye(R)[0]
+    np.testing.assert_allclose(edges.log_lengths(larger), edges.log_lengths(c) + scale, atol=1e-9)
+
+
+@settings(max_examples=5, deadline=None)
+@given(rng=SEEDS)
+def test_adjustment_ends_in_a_minimum_with_mean_depth_one(rng: np.random.Generator) -> None:
+    edges, stiffness, c = some_edges(rng)
+    solver = Solver(steps=200, enough=1e-12)
+    found = adjust_depths(edges, c, stiffness, solver)
+    assert cost(edges, found, stiffness, solver) < cost(edges, c - c.mean(axis=0) * np.eye(R)[0], stiffness, solver)
+    slope = gradient(edges, found, stiffness, solver)
+    slope[:, 0] -= slope[:, 0].mean()
+    assert np.abs(slope).max() < 1e-3
+    assert abs(found[:, 0].mean()) < 1e-9
+
+
+@settings(max_examples=5, deadline=None)
+@given(rng=SEEDS)
+def test_known_lengths_bring_a_frame_back(rng: np.random.Generator) -> None:
+    edges, stiffness, c = some_edges(rng)
+    one = edges.frames(slice(0, 1))
+    logs = one.log_lengths(c[:1])[0]
+    found = finish_depths(one, logs, c[:1] + 0.02 * rng.standard_normal((1, R)), stiffness, 0.0, steps=30)
+    np.testing.assert_allclose(one.log_lengths(found)[0], logs, atol=1e-4)

@@ -1,0 +1,25 @@
+"""The convex start: no edge longer than its length, and nothing to say about points without edges."""
+
+import numpy as np
+
+from reconstruction.mapping.max_depth import maximum_depth
+from reconstruction.mapping.nodes import neighbours, rays_of
+from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
+
+
+def test_deepest_shapes_are_near_the_true_ones() -> None:
+    W, S = waving_sheet(np.random.default_rng(1), frames=10, points=40, noise_px=0.0)
+    ends = neighbours(W, 6)
+    depth = maximum_depth(rays_of(W, CAMERA), ends, np.ones((10, len(ends)), bool))
+    ratio = np.log(depth / S[:, 2])
+    assert np.std(ratio) < 0.15
+
+
+def test_points_without_edges_are_unknown() -> None:
+    W, _ = waving_sheet(np.random.default_rng(2), frames=5, points=30, noise_px=0.0)
+    ends = neighbours(W, 6)
+    seen = np.ones((5, len(ends)), bool)
+    seen[2, (ends == 7).any(axis=1)] = False
+    depth = maximum_depth(rays_of(W, CAMERA), ends, seen)
+    assert np.isnan(depth[2, 7])
+    assert np.isfinite(np.delete(depth[2], 7)).all()

@@ -1,0 +1,51 @@
+"""Smooth maps between images: noise averaged out, gaps filled, gross errors told; the thin-plate field."""
+
+import numpy as np
+import pytest
+
+from reconstruction.mapping.smooth_field import smooth_field
+from reconstruction.mapping.warps import median, reference_image, smooth_warps
+from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
+
+
+def test_smooth_images_are_nearer_to_the_truth_than_the_observations() -> None:
+    W, S = waving_sheet(np.random.default_rng(1), points=250, amplitude=0.3, noise_px=0.5)
+    warps = smooth_warps(W, np.ones((12, 250), bool))
+    true = CAMERA.project(S)
+    rms = [np.sqrt(((w - true) ** 2).mean()) for w in (W, warps.images(warps.reference))]
+    assert rms[1] < 0.7 * rms[0]
+    assert np.median(warps.noise_px) == pytest.approx(0.5, rel=0.25)
+
+
+def test_points_missing_in_the_reference_image_are_placed_by_the_others() -> None:
+    rng = np.random.default_rng(2)
+    W, _ = waving_sheet(rng, points=250, amplitude=0.3, noise_px=0.0)
+    visible = rng.random((12, 250)) > 0.4
+    fullest = visible.sum(axis=1).argmax()
+    reference = reference_image(np.where(visible[:, None], W, np.nan), visible)
+    assert np.isfinite(reference).all()
+    assert np.median(np.linalg.norm(reference - W[fullest], axis=0)) < 2.0
+
+
+def test_what_is_far_from_all_visible_points_is_uncertain() -> None:
+    W, _ = waving_sheet(np.random.default_rng(3), points=200, amplitude=0.3)
+    visible = np.ones((12, 200), bool)
+    visible[4] = W[0, 0] < np.median(W[0, 0])
+    warps = smooth_warps(np.where(visible[:, None], W, np.nan), visible)
+    variance = warps.variance(warps.reference)[4]
+    assert np.median(variance[~visible[4]]) > 10 * np.median(variance[visible[4]])
+
+
+def test_field_reproduces_affine_functions_and_its_own_nodes() -> None:
+    rng = np.random.default_rng(4)
+    nodes = rng.uniform(0, 500, (2, 30))
+    field = smooth_field(nodes, 30)
+    B = field.at(nodes)
+    assert np.linalg.matrix_rank(B) == 30
+    np.testing.assert_allclose(B[:, 3:].T @ B[:, :3], 0, atol=1e-6)
+    np.testing.assert_allclose((B[:, 3:] ** 2).mean(axis=0), 1, rtol=1e-6)
+
+
+def test_median_ignores_what_is_not_there() -> None:
+    values = np.array([[1.0, np.nan, np.nan], [3.0, 2.0, np.nan], [2.0, 4.0, np.nan]])
+    np.testing.assert_array_equal(median(values), [2.0, 3.0, np.nan])
