@@ -1,15 +1,15 @@
 """Model selection: flat, solid or sheet, by what each leaves over on keyframes that it was not made from.
 
-All are measured alike, over edges between neighbouring points (i, j), made from one half of the keyframes and seen by the other:
+Each is made from one half of the keyframes and seen by the other, over edges (i, j) between neighbouring points:
 
     flat, solid   ‖(u_i − w_i) − (u_j − w_j)‖/√2 of a rigid shape's image u and the observation w, poses fitted
-    sheet         |log l_ij − (its median in the half it was made from)| ‖w_i − w_j‖/√2, l lengths of shapes that keep them if they can
+    sheet         |log l_ij − its median where it was made| ‖w_i − w_j‖/√2, l lengths of shapes that keep them if they can
 
-so that each is the noise of the tracks in pixels where the hypothesis is true. A solid that deforms a little moves as a whole
-by what neighbours share; a sheet that bends does not: only its lengths stay.
+so that each is the noise of the tracks in pixels where the hypothesis is true.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -20,7 +20,8 @@ from scipy.spatial import cKDTree
 from reconstruction import ReconstructionError
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.camera import Camera
-from reconstruction.mapping.bundle import Adjustment, Bundle, Loss, Prior, adjust
+from reconstruction.mapping.adjustment import Adjustment, adjust
+from reconstruction.mapping.bundle import Bundle, Loss, Prior
 from reconstruction.mapping.outliers import medians, usual
 from reconstruction.mapping.solid import FEWEST_VIEWS, TAIL_SIGMAS, Solid, bundle_adjust
 
@@ -29,12 +30,13 @@ Indices = NDArray[np.int64]
 Visibility = NDArray[np.bool_]
 Kind = Literal["flat", "solid", "sheet"]
 Surface = Callable[[Array, Visibility, Camera], Array]
-"""Shapes (K, 3, p) of a sheet of one metric in keyframes (K, 2, p) px, visible (K, p); NaN for points that it leaves out."""
+"""Shapes (K, 3, p) of a sheet of one metric in keyframes (K, 2, p) px, visible (K, p); NaN for points left out."""
 
 COMPARED = 80  # points
 NEIGHBOURS = 6  # of each
 OFTEN = 0.8  # of the keyframes in which a point to compare is seen
 SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
+LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
 SHEET_FREEDOM = 1.2  # a sheet must leave so many times less than anything rigid
 SIGMAS = 1.1774  # median of a Rayleigh distribution
 HALF_NORMAL = 0.6745  # median of a half-normal one
@@ -81,7 +83,8 @@ class Evidence:
         """In words, for the log."""
         left = f"flat {self.flat.edges_px:.2f}, solid {self.solid.edges_px:.2f}, sheet {self.sheet.edges_px:.2f} px"
         lengths = "" if np.isnan(self.length_change) else f"; lengths change by {self.length_change:.1%}"
-        return f"{self.kind}: left over on other keyframes {left}{lengths}; turn {self.turn_degrees:.0f}°, relief {self.relief:.2f}"
+        solid = f"turn {self.turn_degrees:.0f}°, relief {self.relief:.2f}"
+        return f"{self.kind}: left over on other keyframes {left}{lengths}; {solid}"
 
 
 def select(W: Array, visible: Visibility, camera: Camera, surface: Surface | None = None) -> Evidence:
@@ -107,30 +110,29 @@ def select(W: Array, visible: Visibility, camera: Camera, surface: Surface | Non
     solid, flat = (rigid_misfit(models, seen, camera, edges) for models in (solids, planes))
     sheet, change = Misfit(np.nan, np.nan), np.nan
     if surface is not None and camera.perspective:
-        try:
+        with suppress(ReconstructionError):  # no sheet, then
             sheet, change = sheet_misfit([surface(w, h, camera) for w, h in seen], seen, edges)
-        except ReconstructionError:
-            pass  # no sheet, then
-    kind, sureness = decide(flat, solid, sheet)
     turn, relief = (float(np.mean([getattr(one, name) for one in solids])) for name in ("turn_degrees", "relief"))
+    kind, sureness = decide(flat, solid, sheet, relief)
     return Evidence(kind, flat, solid, sheet, change, sureness, turn, relief)
 
 
-def decide(flat: Misfit, solid: Misfit, sheet: Misfit) -> tuple[Kind, float]:
-    """The kind, and how many times more the next best leaves. Rigid shapes compete by the whole, with a sheet by the edges."""
-    rigid: Kind = "solid" if SOLID_FREEDOM * solid.whole_px < flat.whole_px else "flat"
+def decide(flat: Misfit, solid: Misfit, sheet: Misfit, relief: float) -> tuple[Kind, float]:
+    """The kind, and how many times more the next best leaves.
+
+    Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges.
+    """
     gain = flat.whole_px / (SOLID_FREEDOM * solid.whole_px)
+    rigid: Kind = "solid" if gain > 1 and relief > LEAST_RELIEF else "flat"
     rigid_px = solid.edges_px if rigid == "solid" else min(flat.edges_px, solid.edges_px)
-    bends = rigid_px / (SHEET_FREEDOM * sheet.edges_px)
-    if bends > 1:
-        return "sheet", float(bends)
-    against_sheet = np.inf if np.isnan(bends) else 1 / bends
+    sheet_px = SHEET_FREEDOM * sheet.edges_px
+    if sheet_px < rigid_px:
+        return "sheet", float(rigid_px / max(sheet_px, 1e-300))
+    against_sheet = np.inf if np.isnan(sheet_px) else sheet_px / max(rigid_px, 1e-300)
     return rigid, float(min(max(gain, 1 / gain), against_sheet))
 
 
-def rigid_misfit(
-    models: list[Solid], seen: list[tuple[Array, Visibility]], camera: Camera, edges: Indices
-) -> Misfit:
+def rigid_misfit(models: list[Solid], seen: list[tuple[Array, Visibility]], camera: Camera, edges: Indices) -> Misfit:
     """Of rigid shapes of the two halves of the keyframes, each on the other half."""
     i, j = edges.T
     single, between = [], []
@@ -148,7 +150,7 @@ def sheet_misfit(shapes: list[Array], seen: list[tuple[Array, Visibility]], edge
     Raises:
         ReconstructionError: the sheets have no edge in common.
     """
-    known = np.logical_and(*(np.isfinite(S).all(axis=(0, 1)) for S in shapes))
+    known: Visibility = np.asarray(np.isfinite(np.concatenate(shapes)).all(axis=(0, 1)))
     i, j = edges[known[edges].all(axis=1)].T
     if not i.size:
         raise ReconstructionError("no edge is known in both halves of the keyframes")
@@ -170,16 +172,16 @@ def spread_edges(W: Array, visible: Visibility) -> Indices:
     often = np.flatnonzero(share >= min(OFTEN, float(np.median(share))))
     view = int(visible[:, often].sum(axis=1).argmax())
     often = often[visible[view, often]]
-    few = often[farthest_points(W[view][:, often].T, COMPARED)]
-    few = np.unique(few)
-    near = cKDTree(W[view][:, few].T).query(W[view][:, few].T, k=min(NEIGHBOURS + 1, len(few)))[1][:, 1:]
+    few = np.unique(often[farthest_points(W[view][:, often].T, COMPARED)])
+    place = W[view][:, few].T
+    near = np.asarray(cKDTree(place).query(place, k=range(1, min(NEIGHBOURS + 1, len(few)) + 1))[1], np.int64)[:, 1:]
     i = np.repeat(np.arange(len(few)), near.shape[1])
     pairs = np.sort(np.stack([i, near.ravel()], axis=1), axis=1)
     return np.asarray(few[np.unique(pairs[pairs[:, 0] < pairs[:, 1]], axis=0)])
 
 
 def image_in(solid: Solid, W: Array, visible: Visibility, camera: Camera) -> Array:
-    """Image (K, 2, p) px of a solid in keyframes it was not made from, posed as fits best, starting as the view most alike."""
+    """Image (K, 2, p) px of a solid in other keyframes, posed as fits best, starting as the view most alike."""
     W, h = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None], visible.astype(np.float64)
     bundle = Bundle(solid.motion, 1 / solid.camera.focal_px)
     image, motion = bundle.image(), solid.motion

@@ -7,9 +7,11 @@ from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
-from reconstruction.mapping.bundle import Adjustment, Bundle, Loss, Prior, adjust, off_plane, scaled
+from reconstruction.mapping.adjustment import Adjustment, adjust
+from reconstruction.mapping.bundle import Bundle, Loss, Prior, off_plane, scaled
 from reconstruction.mapping.factorization import view_turn_degrees
-from reconstruction.mapping.outliers import usual
+from reconstruction.mapping.outliers import usual, without_outliers
+from reconstruction.mapping.rest_shape import TURN_DEGREES
 from reconstruction.mapping.rigid import RigidMotion
 from reconstruction.mapping.spikes import smoothed
 from reconstruction.mapping.views import building_order, completed, likeness
@@ -85,7 +87,8 @@ def bundle_adjust(W: Array, visible: Visibility, camera: Camera, *, refine_focal
     """
     if len(W) < FEWEST_VIEWS or (visible.sum(axis=0) >= FEWEST_VIEWS).sum() < FEWEST_POINTS:
         raise ReconstructionError(f"a solid needs {FEWEST_POINTS} points seen in {FEWEST_VIEWS} keyframes or more")
-    W = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None]
+    given, visible = visible, without_outliers(W, visible)
+    W = np.where(given[:, None], W, 0.0) - camera.center_px[:, None]
     alike = likeness(W, visible)
     order, parent = building_order(alike)
     first = completed(W, visible, alike, order[0])
@@ -97,10 +100,12 @@ def bundle_adjust(W: Array, visible: Visibility, camera: Camera, *, refine_focal
     build = Build(W[order] / unit, visible[order].astype(np.float64), first / unit, turn, scale, place, flat)
     starts = (build.run(bulge, kappa, refine=refine_focal) for bulge in ((1, -1) if kappa else (1,)))
     found = sorted(starts, key=lambda one: one[1])
+    if kappa and not flat:
+        found = sorted([*found, build.reversed(found[0][0], kappa, refine=refine_focal)], key=lambda one: one[1])
     bundle = scaled(found[0][0], unit)
     back = np.argsort(order)
     bundle = Bundle(replace(bundle[back].motion).in_first_frame(), bundle.kappa)
-    return describe(W, visible, bundle, camera, (found[0][1], found[-1][1]))
+    return describe(W, given, bundle, camera, (found[0][1], found[1][1] if kappa else found[0][1]))
 
 
 @dataclass(frozen=True)
@@ -133,6 +138,13 @@ class Build:
             bundle, count = self._with_views(bundle, more), more
             bundle, _ = self._adjust(bundle, kappa, PLACING)
             bundle, _ = self._adjust(bundle, kappa, GROWING)
+        return self._settled(bundle, kappa, refine=refine)
+
+    def reversed(self, bundle: Bundle, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
+        """From a bundle with its depth reversed, which explains distant views as well."""
+        return self._settled(Bundle(bundle.motion.mirrored(), kappa), kappa, refine=refine)
+
+    def _settled(self, bundle: Bundle, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
         bundle, value = self._adjust(bundle, kappa, SETTLING)
         for _ in range(ROUNDS):
             bundle, value = self._adjust(bundle, kappa, SETTLING, refine=refine, redescending=True)
@@ -170,7 +182,7 @@ def prior_of(bundle: Bundle, h: Array, sigma: float, kappa: float, *, refine: bo
     """Depths of half the width, the focal length as given; both as weak as so many observations of that noise."""
     shape = bundle.motion.shape
     deep = HALF_WIDTH * float(np.sqrt(np.var(shape[:2], axis=1).mean()))
-    excess = float((off_plane(shape) ** 2).mean()) / deep**2
+    excess = float((off_plane(shape)[1] ** 2).mean()) / deep**2
     depth = (LOOSE + PROOF * h.sum() / len(shape.T) * excess) * (sigma / deep) ** 2
     focal = FOCAL_PROOF * h.sum() * (sigma / FOCAL_DOUBT) ** 2 if refine and kappa else np.inf
     return Prior(depth, focal, kappa)
@@ -199,11 +211,14 @@ def relief(shape: Array) -> float:
 
 
 def describe(W: Array, visible: Visibility, bundle: Bundle, camera: Camera, bulges: tuple[float, float]) -> Solid:
-    """The solid of a bundle in pixels, its spikes smoothed."""
+    """The solid of a bundle in pixels, its spikes smoothed; W and bundle relative to the principal point."""
     residual = np.where(visible, np.linalg.norm(bundle.image() - W, axis=1), np.nan)
     focal = 1 / bundle.kappa if bundle.kappa else np.inf
     motion, trusted = smoothed(W, visible, bundle, residual)
     turn = view_turn_degrees(motion.R)
     depth = relief(motion.shape)
-    note = f"solid from {len(W)} keyframes, turned {turn:.0f}°, median residual {np.nanmedian(residual):.2f} px, relief {depth:.2f} of the width"
+    note = f"solid from {len(W)} keyframes, turned {turn:.0f}°, median residual {np.nanmedian(residual):.2f} px"
+    note += f", relief {depth:.2f} of the width"
+    if turn < TURN_DEGREES:
+        note += f" (hardly turned: relief beyond {HALF_WIDTH:g} is not believed without proof)"
     return Solid(motion, replace(camera, focal_px=focal), residual, trusted, turn, depth, bulges, note)

@@ -1,7 +1,8 @@
 """Spikes of a rigid shape: depths that the views hardly hold are drawn to the plane through their neighbours.
 
-The most likely depths z, of which the views say ẑ_i ± σ_i, on a surface whose vertices lie off the plane of their neighbours by
-d = D z, usually τ:    min Σ_i (z_i − ẑ_i)²/σ_i² + Σ_i d_i²/τ_i²,   τ_i = τ times the neighbours' distance over the usual one.
+The most likely depths z, of which the views say ẑ_i ± σ_i, on a surface whose vertices are d = D z off their neighbours':
+
+    min Σ_i (z_i − ẑ_i)²/σ_i² + Σ_i d_i²/τ_i²,   τ_i the usual d times the neighbours' distance over the usual one.
 """
 
 from dataclasses import replace
@@ -23,13 +24,15 @@ Visibility = NDArray[np.bool_]
 
 INLIER_SIGMAS = 3.0  # of the residuals
 LIKE_VIEWS = 4.0  # views whose errors are alike, since what deforms stays so for a while: they count as one
+LEAST_SIGMA = 0.005  # of half the width: less is what anything deforms by
 SHARE = 0.5  # of a point's observations that must agree with the solid
 FEWEST = 3  # of them
 ASIDE = 0.02  # weight of a point that does not move with the solid among the neighbours of one that does
 LEAST = 0.05  # of the usual distance from the neighbours' plane: no depth is surer
 ROUNDS = 3  # of leaving out what is a spike
-LARGEST = 0.6  # times half the width, both RMS: no vertex of a trusted surface is further off its neighbours' plane
-SPIKE = 5.0  # times the usual distance from the neighbours' plane that smoothing may move a point of its own depth
+LARGEST = 0.8  # times half the width, both RMS, that a vertex may be off its neighbours' plane; 12 % of the width across
+PROVEN = 20.0  # standard deviations of its depth that it may, too: a nose of few points is no spike
+SMOOTHEST = 0.1  # times the same: no surface is believed to be smoother, or creases would be rounded
 
 
 def smoothed(W: Array, visible: Visibility, bundle: Bundle, residual: Array) -> tuple[RigidMotion, Visibility]:
@@ -43,28 +46,33 @@ def smoothed(W: Array, visible: Visibility, bundle: Bundle, residual: Array) -> 
     """
     axes = principal_axes(bundle.motion.shape)
     shape = axes.T @ bundle.motion.shape
-    known = residual[visible]
-    sigma = usual(known, 1e-9 * float(np.abs(shape).max()))
+    deep = float(np.sqrt(np.var(shape[:2], axis=1).mean())) / 2
+    sigma = usual(residual[visible], LEAST_SIGMA * deep)
     agrees = visible & (np.nan_to_num(residual, nan=np.inf) < INLIER_SIGMAS * 1.2 * sigma)
     count = agrees.sum(axis=0)
     sound = (count >= FEWEST) & (count >= SHARE * visible.sum(axis=0))
     information = axes.T @ point_information(W, agrees.astype(np.float64), bundle) @ axes
     own = np.sqrt((np.where(agrees, residual, 0.0) ** 2).sum(axis=0) / count.clip(1) / 2)
     noise = np.sqrt((own**2 + sigma**2) / 2)
-    deep = float(np.sqrt(np.var(shape[:2], axis=1).mean())) / 2
     spread = np.minimum(depth_variance(information) * noise**2 * LIKE_VIEWS, deep**2)
+
+    def spike(off: Array) -> Visibility:
+        return np.asarray((np.abs(off) > LARGEST * deep) & (np.abs(off) < PROVEN * np.sqrt(spread)))
+
     for _ in range(ROUNDS):
         D, distance = off_neighbours_plane(shape[:2], sound)
         off = np.abs(D @ shape[2])
-        tau = max(float(np.median(off[sound] if sound.any() else off)) / 0.6745, 1e-6 * deep)
+        tau = max(float(np.median(off[sound] if sound.any() else off)) / 0.6745, SMOOTHEST * deep)
         weight = np.where(sound, 1 / (spread + (LEAST * tau) ** 2), 1 / deep**2)
         stiffness = D.T @ sp.diags_array((np.median(distance) / (tau * distance)) ** 2) @ D
         z = np.asarray(spsolve((sp.diags_array(weight) + stiffness).tocsc(), weight * shape[2]))
-        change = z - shape[2]
-        sound = sound & (np.abs(change) < SPIKE * tau) & (np.abs(D @ z) < LARGEST * deep)
-    off = off_neighbours_plane(shape[:2], np.ones_like(sound))[0] @ z
-    change -= off - np.clip(off, -LARGEST * deep, LARGEST * deep)
-    return replace(bundle.motion, shape=axes @ (shape + along(information, change))), sound
+        sound = sound & ~spike(D @ z)
+    D, _ = off_neighbours_plane(shape[:2], np.ones_like(sound))
+    for _ in range(ROUNDS):  # what smoothing left, most of it at the border
+        off = D @ z
+        far = spike(off)
+        z, sound = z - np.where(far, off, 0.0), sound & ~far
+    return replace(bundle.motion, shape=axes @ (shape + along(information, z - shape[2]))), sound
 
 
 def point_information(W: Array, h: Array, bundle: Bundle) -> Array:
@@ -88,10 +96,10 @@ def along(information: Array, change: Array) -> Array:
 
 
 def off_neighbours_plane(points: Array, sound: Visibility) -> tuple[sp.csr_array, Array]:
-    """D (p, p), which gives each z_i's distance from the plane through its neighbours' z, and the neighbours' mean distance (p,).
+    """D (p, p), so that D z are distances from the planes through the neighbours, and the neighbours' mean distance (p,).
 
-    Neighbours of points (2, p) are those of the Delaunay mesh and theirs. Points that are not sound (p,) are compared with their
-    neighbours' mean instead, since a plane would carry them off beyond the last sound point, and hardly count as neighbours.
+    Neighbours of points (2, p) are those of the Delaunay mesh and theirs. Points that are not sound (p,) hardly count as
+    neighbours, and are compared with the mean of theirs instead: a plane would carry them off beyond the last sound point.
     """
     p = points.shape[1]
     edges = triangulate(points.T).edges

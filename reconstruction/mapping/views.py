@@ -52,7 +52,7 @@ def likeness(W: Array, visible: Visibility) -> Likeness:
 
 
 def building_order(alike: Likeness) -> tuple[Indices, Indices]:
-    """The view in the middle, then always the one nearest to those before: views (K,) and (K,) each one's nearest before it."""
+    """Views (K,): the one in the middle, then always the nearest to those before; and (K,) which of those that is."""
     K = len(alike.distance)
     apart = alike.distance + alike.distance.T
     first = int(np.median(apart, axis=1).argmin())
