@@ -1,0 +1,138 @@
+"""A rigid shape and its views: image, derivatives, robust loss and priors.
+
+A point X seen with scale s, rotation R and image translation t, κ = 1/f:
+
+    Y = s R X,    d = 1 + κ Y_z,    u = (Y_xy + t)/d
+
+Derivatives: ∂u/∂Y = [1, 0, −κu_x; 0, 1, −κu_y]/d, ∂u/∂t = 1/d, ∂u/∂log κ = −κ u Y_z/d, and for a turn θ applied on the left
+∂Y/∂θ = −[Y]×, ∂Y/∂log s = Y, ∂Y/∂X = sR. κ = 0 is the orthographic camera.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction.camera import quaternion_exp, rotation_from_quaternion
+from reconstruction.mapping.rigid import RigidMotion
+
+Array = NDArray[np.float64]
+
+POSE = 6  # θ, t, log s of a view
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A rigid shape and its views.
+
+    Attributes:
+        motion: shape (3, p) and K poses.
+        kappa: 1/focal length, in one over the shape's units; 0 for an orthographic camera.
+    """
+
+    motion: RigidMotion
+    kappa: float
+
+    def placed(self) -> Array:
+        """Y (K, 3, p): the shape turned and scaled."""
+        m = self.motion
+        return np.asarray((m.s[:, None, None] * m.R) @ m.shape)
+
+    def image(self, placed: Array | None = None) -> Array:
+        """Points u (K, 2, p) relative to the principal point."""
+        Y = self.placed() if placed is None else placed
+        return np.asarray((Y[:, :2] + self.motion.t[:, :, None]) / (1 + self.kappa * Y[:, 2:]))
+
+    def moved(self, poses: Array, log_kappa: float, points: Array) -> "Bundle":
+        """After a step: poses (K, 6) as θ, t, log s; points (3, p)."""
+        m = self.motion
+        R = rotation_from_quaternion(quaternion_exp(poses[:, :3])) @ m.R
+        motion = RigidMotion(m.shape + points, R, m.s * np.exp(poses[:, 5]), m.t + poses[:, 3:5])
+        return Bundle(motion, self.kappa * float(np.exp(log_kappa)))
+
+    def __getitem__(self, views: NDArray[np.int64]) -> "Bundle":
+        m = self.motion
+        return Bundle(RigidMotion(m.shape, m.R[views], m.s[views], m.t[views]), self.kappa)
+
+
+@dataclass(frozen=True)
+class Loss:
+    """A robust loss of a residual's length e (2-D): Geman-McClure ½ c²e²/(c² + e²), or soft-L1 c²(√(1 + e²/c²) − 1).
+
+    Attributes:
+        scale: c, where it leaves the parabola.
+        redescending: Geman-McClure: what is far off counts for nothing.
+    """
+
+    scale: float
+    redescending: bool
+
+    def value(self, squares: Array) -> Array:
+        """Loss of e²."""
+        x = squares / self.scale**2
+        return np.asarray(self.scale**2 * (0.5 * x / (1 + x) if self.redescending else np.sqrt(1 + x) - 1))
+
+    def weight(self, squares: Array) -> Array:
+        """Its derivative by e²/2."""
+        x = squares / self.scale**2
+        return np.asarray((1 + x) ** -2.0 if self.redescending else (1 + x) ** -0.5)
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is believed before: a point is not far off the shape's plane, and the focal length is about as given.
+
+    ½ depth Σ_i d_i² + ½ focal (log κ − log κ₀)², d_i the point's distance, along the first view's axis, from the
+    plane z = a x + b y + c through all.
+
+    Attributes:
+        depth: weight of a depth; 0 for none.
+        focal: weight of the focal length; infinite keeps it.
+        kappa: κ₀.
+    """
+
+    depth: float
+    focal: float
+    kappa: float
+
+    def value(self, bundle: Bundle) -> float:
+        """The energy."""
+        _, off = off_plane(bundle.motion.shape)
+        change = np.log(bundle.kappa / self.kappa) if np.isfinite(self.focal) and self.kappa > 0 else 0.0
+        return float(0.5 * self.depth * off @ off + (0.5 * self.focal * change**2 if change else 0.0))
+
+
+def off_plane(shape: Array) -> tuple[Array, Array]:
+    """Derivative (−a, −b, 1) and values (p,) of the distances along z of a shape (3, p) from its plane z = a x + b y + c.
+
+    Not along the plane's normal: a shape could lean over to come nearer to it.
+    """
+    plane = np.concatenate([shape[:2], np.ones((1, shape.shape[1]))])
+    a, b, c = np.linalg.lstsq(plane.T, shape[2], rcond=None)[0]
+    return np.array([-a, -b, 1.0]), np.asarray(shape[2] - a * shape[0] - b * shape[1] - c)
+
+
+def derivatives(W: Array, bundle: Bundle) -> tuple[Array, Array, Array, Array]:
+    """∂u/∂pose (K, 6, 2, p), ∂u/∂log κ (K, 2, p), ∂u/∂X (K, 3, 2, p), and the residuals u − W (K, 2, p)."""
+    K, _, p = W.shape
+    m, kappa = bundle.motion, bundle.kappa
+    Y = bundle.placed()
+    inverse = 1 / (1 + kappa * Y[:, 2])
+    u = bundle.image(Y)
+    slope = -kappa * u  # ∂u/∂Y_z times d
+    A = np.zeros((K, POSE, 2, p))
+    A[:, 0, 0], A[:, 0, 1] = slope[:, 0] * Y[:, 1], -Y[:, 2] + slope[:, 1] * Y[:, 1]
+    A[:, 1, 0], A[:, 1, 1] = Y[:, 2] - slope[:, 0] * Y[:, 0], -slope[:, 1] * Y[:, 0]
+    A[:, 2, 0], A[:, 2, 1] = -Y[:, 1], Y[:, 0]
+    A[:, 3, 0] = A[:, 4, 1] = 1.0
+    A[:, 5] = Y[:, :2] + slope * Y[:, 2:]
+    A *= inverse[:, None, None]
+    turned = (m.s[:, None, None] * m.R).transpose(0, 2, 1)  # (K, 3 of X, 3 of Y)
+    B = turned[:, :, :2, None] + turned[:, :, 2:, None] * slope[:, None]
+    return A, slope * Y[:, 2:] * inverse[:, None], B * inverse[:, None, None], u - W
+
+
+def scaled(bundle: Bundle, factor: float) -> Bundle:
+    """The same in other units: lengths times `factor`."""
+    m = bundle.motion
+    return Bundle(replace(m, shape=m.shape * factor, t=m.t * factor), bundle.kappa / factor)

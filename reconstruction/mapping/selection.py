@@ -1,0 +1,206 @@
+"""Model selection: flat, solid or sheet, by what each leaves over on keyframes that it was not made from.
+
+Each is made from one half of the keyframes and seen by the other, over edges (i, j) between neighbouring points:
+
+    flat, solid   ‖(u_i − w_i) − (u_j − w_j)‖/√2 of a rigid shape's image u and the observation w, poses fitted
+    sheet         |log l_ij − its median where it was made| ‖w_i − w_j‖/√2, l lengths of shapes that keep them if they can
+
+so that each is the noise of the tracks in pixels where the hypothesis is true.
+"""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from reconstruction import ReconstructionError
+from reconstruction.basis.mesh import farthest_points
+from reconstruction.camera import Camera
+from reconstruction.mapping.adjustment import Adjustment, adjust
+from reconstruction.mapping.bundle import Bundle, Loss, Prior
+from reconstruction.mapping.outliers import medians, usual
+from reconstruction.mapping.solid import FEWEST_VIEWS, TAIL_SIGMAS, Solid, bundle_adjust
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Visibility = NDArray[np.bool_]
+Kind = Literal["flat", "solid", "sheet"]
+Surface = Callable[[Array, Visibility, Camera], Array]
+"""Shapes (K, 3, p) of a sheet of one metric in keyframes (K, 2, p) px, visible (K, p); NaN for points left out."""
+
+COMPARED = 80  # points
+NEIGHBOURS = 6  # of each
+OFTEN = 0.8  # of the keyframes in which a point to compare is seen
+SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
+LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
+SHEET_FREEDOM = 1.2  # a sheet must leave so many times less than anything rigid
+SIGMAS = 1.1774  # median of a Rayleigh distribution
+HALF_NORMAL = 0.6745  # median of a half-normal one
+ROUNDS = 4  # of robust weights of a pose
+POSES = Adjustment(steps=15, tolerance=1e-3, points=False)
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What a hypothesis leaves over on keyframes that it was not made from; deviation in one coordinate.
+
+    Attributes:
+        edges_px: of a point against its neighbours.
+        whole_px: of a point against the whole; NaN for a sheet, which goes through every point.
+    """
+
+    edges_px: float
+    whole_px: float
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What keyframes say about the kind of object.
+
+    Attributes:
+        kind: the hypothesis chosen.
+        flat, solid, sheet: what each leaves over; NaN where it was not to be had.
+        length_change: change of the sheet's edge lengths between the halves of the keyframes; a robust deviation, relative.
+        sureness: by what factor the next best hypothesis leaves more, freedom reckoned with; 1 is a toss-up.
+        turn_degrees, relief: of the solid.
+    """
+
+    kind: Kind
+    flat: Misfit
+    solid: Misfit
+    sheet: Misfit
+    length_change: float
+    sureness: float
+    turn_degrees: float
+    relief: float
+
+    @property
+    def note(self) -> str:
+        """In words, for the log."""
+        left = f"flat {self.flat.edges_px:.2f}, solid {self.solid.edges_px:.2f}, sheet {self.sheet.edges_px:.2f} px"
+        lengths = "" if np.isnan(self.length_change) else f"; lengths change by {self.length_change:.1%}"
+        solid = f"turn {self.turn_degrees:.0f}°, relief {self.relief:.2f}"
+        return f"{self.kind}: left over on other keyframes {left}{lengths}; {solid}"
+
+
+def select(W: Array, visible: Visibility, camera: Camera, surface: Surface | None = None) -> Evidence:
+    """Which kind of object keyframes (K, 2, p) px with visibility (K, p) show.
+
+    Args:
+        W: anything where not visible.
+        visible: (K, p).
+        camera: its focal length is taken as it is.
+        surface: makes a sheet; without it, or with an orthographic camera, a sheet is not considered.
+
+    Raises:
+        ReconstructionError: too few keyframes for two halves.
+    """
+    if len(W) < 2 * FEWEST_VIEWS:
+        raise ReconstructionError(f"{2 * FEWEST_VIEWS} keyframes are needed to tell what the object is, not {len(W)}")
+    halves = [np.arange(k, len(W), 2) for k in (0, 1)]
+    seen = [(W[half], visible[half]) for half in halves]
+    edges = spread_edges(W, visible)
+    solids, planes = (
+        [bundle_adjust(w, h, camera, refine_focal=False, flat=flat) for w, h in seen] for flat in (False, True)
+    )
+    solid, flat = (rigid_misfit(models, seen, camera, edges) for models in (solids, planes))
+    sheet, change = Misfit(np.nan, np.nan), np.nan
+    if surface is not None and camera.perspective:
+        with suppress(ReconstructionError):  # no sheet, then
+            sheet, change = sheet_misfit([surface(w, h, camera) for w, h in seen], seen, edges)
+    turn, relief = (float(np.mean([getattr(one, name) for one in solids])) for name in ("turn_degrees", "relief"))
+    kind, sureness = decide(flat, solid, sheet, relief)
+    return Evidence(kind, flat, solid, sheet, change, sureness, turn, relief)
+
+
+def decide(flat: Misfit, solid: Misfit, sheet: Misfit, relief: float) -> tuple[Kind, float]:
+    """The kind, and how many times more the next best leaves.
+
+    Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges.
+    """
+    gain = flat.whole_px / (SOLID_FREEDOM * solid.whole_px)
+    rigid: Kind = "solid" if gain > 1 and relief > LEAST_RELIEF else "flat"
+    rigid_px = solid.edges_px if rigid == "solid" else min(flat.edges_px, solid.edges_px)
+    sheet_px = SHEET_FREEDOM * sheet.edges_px
+    if sheet_px < rigid_px:
+        return "sheet", float(rigid_px / max(sheet_px, 1e-300))
+    against_sheet = np.inf if np.isnan(sheet_px) else sheet_px / max(rigid_px, 1e-300)
+    return rigid, float(min(max(gain, 1 / gain), against_sheet))
+
+
+def rigid_misfit(models: list[Solid], seen: list[tuple[Array, Visibility]], camera: Camera, edges: Indices) -> Misfit:
+    """Of rigid shapes of the two halves of the keyframes, each on the other half."""
+    i, j = edges.T
+    single, between = [], []
+    for model, (W, visible) in zip(models, reversed(seen), strict=True):
+        off = np.where(visible[:, None], image_in(model, W, visible, camera) - W, 0.0)
+        both = visible[:, i] & visible[:, j]
+        between.append(np.median(np.linalg.norm(off[:, :, i] - off[:, :, j], axis=1)[both]) / SIGMAS / np.sqrt(2))
+        single.append(np.median(np.linalg.norm(off, axis=1)[visible]) / SIGMAS)
+    return Misfit(rms(between), rms(single))
+
+
+def sheet_misfit(shapes: list[Array], seen: list[tuple[Array, Visibility]], edges: Indices) -> tuple[Misfit, float]:
+    """Of sheets (K, 3, p) of the two halves of the keyframes, each on the other half; and the change of lengths.
+
+    Raises:
+        ReconstructionError: the sheets have no edge in common.
+    """
+    known: Visibility = np.asarray(np.isfinite(np.concatenate(shapes)).all(axis=(0, 1)))
+    i, j = edges[known[edges].all(axis=1)].T
+    if not i.size:
+        raise ReconstructionError("no edge is known in both halves of the keyframes")
+    logs = [np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)) for S in shapes]
+    pixels, changes = [], []
+    for made, tested, (W, visible) in zip(logs, reversed(logs), reversed(seen), strict=True):
+        change = tested - np.median(made, axis=0)
+        change = np.abs(change - np.median(change))
+        both = visible[:, i] & visible[:, j]
+        length = np.linalg.norm(W[:, :, i] - W[:, :, j], axis=1)
+        pixels.append(np.median((change * length)[both]) / HALF_NORMAL / np.sqrt(2))
+        changes.append(np.median(change[both]) / HALF_NORMAL)
+    return Misfit(rms(pixels), np.nan), rms(changes)
+
+
+def spread_edges(W: Array, visible: Visibility) -> Indices:
+    """Edges (n, 2) between well-spread points and those beside them, of points seen in most keyframes."""
+    share = visible.mean(axis=0)
+    often = np.flatnonzero(share >= min(OFTEN, float(np.median(share))))
+    view = int(visible[:, often].sum(axis=1).argmax())
+    often = often[visible[view, often]]
+    few = np.unique(often[farthest_points(W[view][:, often].T, COMPARED)])
+    place = W[view][:, few].T
+    near = np.asarray(cKDTree(place).query(place, k=range(1, min(NEIGHBOURS + 1, len(few)) + 1))[1], np.int64)[:, 1:]
+    i = np.repeat(np.arange(len(few)), near.shape[1])
+    pairs = np.sort(np.stack([i, near.ravel()], axis=1), axis=1)
+    return np.asarray(few[np.unique(pairs[pairs[:, 0] < pairs[:, 1]], axis=0)])
+
+
+def image_in(solid: Solid, W: Array, visible: Visibility, camera: Camera) -> Array:
+    """Image (K, 2, p) px of a solid in other keyframes, posed as fits best, starting as the view most alike."""
+    W, h = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None], visible.astype(np.float64)
+    bundle = Bundle(solid.motion, 1 / solid.camera.focal_px)
+    image, motion = bundle.image(), solid.motion
+    apart = np.where(visible[:, None, None], W[:, None] - image, np.nan)  # (K, views, 2, p)
+    shift = medians(apart, axis=3)
+    left = medians(np.linalg.norm(apart - shift[..., None], axis=2), axis=2)
+    like = left.argmin(axis=1)
+    views = np.append(0, like)  # the first keeps its turn and scale: one that counts for nothing
+    shifted = np.concatenate([np.zeros((1, 2)), shift[np.arange(len(W)), like]])
+    bundle = bundle[views]
+    bundle = replace(bundle, motion=replace(bundle.motion, t=motion.t[views] + shifted))
+    padded, counting = np.concatenate([W[:1], W]), np.concatenate([np.zeros((1, W.shape[2])), h])
+    for _ in range(ROUNDS):
+        off = np.linalg.norm(bundle.image() - padded, axis=1)[counting > 0]
+        loss = Loss(TAIL_SIGMAS * usual(off, 1e-9 * float(np.abs(motion.shape).max())), redescending=False)
+        bundle, _ = adjust(padded, counting, bundle, loss, Prior(0.0, np.inf, bundle.kappa), POSES)
+    return bundle.image()[1:] + camera.center_px[:, None]
+
+
+def rms(values: list[float]) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))

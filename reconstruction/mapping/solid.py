@@ -1,0 +1,224 @@
+"""A solid's rest shape from view-spread keyframes: robust rigid bundle adjustment from shallow domes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction import ReconstructionError
+from reconstruction.camera import Camera
+from reconstruction.mapping.adjustment import Adjustment, adjust
+from reconstruction.mapping.bundle import Bundle, Loss, Prior, off_plane, scaled
+from reconstruction.mapping.factorization import view_turn_degrees
+from reconstruction.mapping.outliers import usual, without_outliers
+from reconstruction.mapping.rest_shape import TURN_DEGREES
+from reconstruction.mapping.rigid import RigidMotion
+from reconstruction.mapping.spikes import smoothed
+from reconstruction.mapping.views import building_order, completed, likeness
+
+Array = NDArray[np.float64]
+Visibility = NDArray[np.bool_]
+
+FEWEST_VIEWS, FEWEST_POINTS = 3, 6
+DOME = 0.4  # height of the shape it starts from, over its RMS radius
+FIRST_VIEWS = 4  # adjusted together first; then twice as many, and so on
+TAIL_SIGMAS = 3.0  # of the residuals, where the loss leaves the parabola
+LEAST_TAIL = 0.005  # of the size: what tracks of a fine surface are off by anyway
+HALF_WIDTH = 0.5  # relief over width that is as deep as is believed without proof
+PROOF = 0.01  # share of the residuals that twice that relief must explain
+LOOSE = 0.3  # of one observation, says that a point is no deeper
+FOCAL_DOUBT = 0.3  # deviation of log focal length, believed as one part in FOCAL_PROOF of the observations
+FOCAL_PROOF = 0.01
+PLACING = Adjustment(steps=5, tolerance=1e-2, points=False)
+GROWING = Adjustment(steps=6, tolerance=1e-2)
+SETTLING = Adjustment(steps=15, tolerance=1e-3)
+FLAT = 1e5  # weight of a depth off a plane
+FLAT_DOME = 1e-3
+ROUNDS = 3  # of the noise at the end
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A rigid shape that explains keyframes, and how well.
+
+    Attributes:
+        motion: shape (3, p) and the K keyframes' poses, in camera axes and pixels of the first keyframe.
+        camera: with the focal length that fits best.
+        residual_px: (K, p) distance of observation and image, NaN where not visible.
+        trusted: (p,) whether the point's depth is its own; else its neighbours gave it.
+        turn_degrees: rotation of the viewing direction covered.
+        relief: extent off the shape's main plane over that along it, both RMS.
+        bulges: robust energies of the two starts per observation, the better first.
+        note: all that in words.
+    """
+
+    motion: RigidMotion
+    camera: Camera
+    residual_px: Array
+    trusted: Visibility
+    turn_degrees: float
+    relief: float
+    bulges: tuple[float, float]
+    note: str
+
+    @property
+    def shape(self) -> Array:
+        """(3, p)."""
+        return self.motion.shape
+
+    @property
+    def frame_residuals_px(self) -> Array:
+        """(K,) median residual of each keyframe."""
+        return np.asarray(np.nanmedian(self.residual_px, axis=1))
+
+
+def bundle_adjust(W: Array, visible: Visibility, camera: Camera, *, refine_focal: bool = True, flat: bool = False) -> Solid:
+    """The rigid shape that explains keyframes best.
+
+    Args:
+        W: (K, 2, p) px; anything where not visible.
+        visible: (K, p).
+        camera: its focal length may be a guess.
+        refine_focal: whether the views may change it.
+        flat: whether the shape is a plane, whatever the views say.
+
+    Raises:
+        ReconstructionError: fewer than 3 keyframes, or 6 points seen often enough.
+    """
+    if len(W) < FEWEST_VIEWS or (visible.sum(axis=0) >= FEWEST_VIEWS).sum() < FEWEST_POINTS:
+        raise ReconstructionError(f"a solid needs {FEWEST_POINTS} points seen in {FEWEST_VIEWS} keyframes or more")
+    given, visible = visible, without_outliers(W, visible)
+    W = np.where(given[:, None], W, 0.0) - camera.center_px[:, None]
+    alike = likeness(W, visible)
+    order, parent = building_order(alike)
+    first = completed(W, visible, alike, order[0])
+    unit = float(np.sqrt(np.var(first, axis=1).sum()))
+    turn = alike.a[parent, order] / np.abs(alike.a[parent, order])  # of each view against that it is built on
+    place = np.argsort(order)[parent]
+    kappa = unit / camera.focal_px
+    scale = np.abs(alike.a[parent, order])
+    build = Build(W[order] / unit, visible[order].astype(np.float64), first / unit, turn, scale, place, flat)
+    starts = (build.run(bulge, kappa, refine=refine_focal) for bulge in ((1, -1) if kappa else (1,)))
+    found = sorted(starts, key=lambda one: one[1])
+    if kappa and not flat:
+        found = sorted([*found, build.reversed(found[0][0], kappa, refine=refine_focal)], key=lambda one: one[1])
+    bundle = scaled(found[0][0], unit)
+    back = np.argsort(order)
+    bundle = Bundle(replace(bundle[back].motion).in_first_frame(), bundle.kappa)
+    return describe(W, given, bundle, camera, (found[0][1], found[1][1] if kappa else found[0][1]))
+
+
+@dataclass(frozen=True)
+class Build:
+    """Keyframes in building order, lengths in units of the shape's RMS radius.
+
+    Attributes:
+        W: (K, 2, p) relative to the principal point.
+        h: (K, p) visibility.
+        first: (2, p) all points in the first.
+        turn, scale: (K,) the similarity from the view each is built on: e^(i angle), and scale.
+        parent: (K,) index of that view.
+        flat: whether the shape is a plane.
+    """
+
+    W: Array
+    h: Array
+    first: Array
+    turn: NDArray[np.complex128]
+    scale: Array
+    parent: NDArray[np.int64]
+    flat: bool
+
+    def run(self, bulge: int, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
+        """From a dome: first the views most alike, then more and more; the bundle and its energy an observation."""
+        bundle = Bundle(dome(self.first, FLAT_DOME * bulge if self.flat else bulge, kappa), kappa)
+        count, total = 1, len(self.W)
+        while count < total:
+            more = min(max(FIRST_VIEWS, 2 * count), total)
+            bundle, count = self._with_views(bundle, more), more
+            bundle, _ = self._adjust(bundle, kappa, PLACING)
+            bundle, _ = self._adjust(bundle, kappa, GROWING)
+        return self._settled(bundle, kappa, refine=refine)
+
+    def reversed(self, bundle: Bundle, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
+        """From a bundle with its depth reversed, which explains distant views as well."""
+        return self._settled(Bundle(bundle.motion.mirrored(), kappa), kappa, refine=refine)
+
+    def _settled(self, bundle: Bundle, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
+        bundle, value = self._adjust(bundle, kappa, SETTLING)
+        for _ in range(ROUNDS):
+            bundle, value = self._adjust(bundle, kappa, SETTLING, refine=refine, redescending=True)
+        return bundle, value
+
+    def _with_views(self, bundle: Bundle, count: int) -> Bundle:
+        """The first `count` views, new ones posed as the view they are built on."""
+        m = bundle.motion
+        R, s, t = list(m.R), list(m.s), list(m.t)
+        for k in range(len(s), count):
+            parent, angle = self.parent[k], self.turn[k]
+            Rz = np.array([[angle.real, -angle.imag, 0.0], [angle.imag, angle.real, 0.0], [0.0, 0.0, 1.0]])
+            R.append(Rz @ R[parent])
+            s.append(s[parent] * self.scale[k])
+            seen = s[k] * R[k] @ m.shape
+            off = self.W[k] * (1 + bundle.kappa * seen[2]) - seen[:2]
+            t.append(np.median(off[:, self.h[k] > 0], axis=1))
+        return Bundle(RigidMotion(m.shape, np.array(R), np.array(s), np.array(t)), bundle.kappa)
+
+    def _adjust(
+        self, bundle: Bundle, kappa: float, how: Adjustment, *, refine: bool = False, redescending: bool = False
+    ) -> tuple[Bundle, float]:
+        """Adjust with a loss and priors scaled to the present residuals."""
+        n = len(bundle.motion.s)
+        W, h = self.W[:n], self.h[:n]
+        sigma = usual(np.linalg.norm(bundle.image() - W, axis=1)[h > 0], LEAST_TAIL / TAIL_SIGMAS)
+        loss = Loss(TAIL_SIGMAS * sigma, redescending)
+        prior = prior_of(bundle, h, sigma, kappa, refine=refine)
+        prior = replace(prior, depth=FLAT) if self.flat else prior
+        bundle, value = adjust(W, h, bundle, loss, prior, how)
+        return bundle, value / h.sum()
+
+
+def prior_of(bundle: Bundle, h: Array, sigma: float, kappa: float, *, refine: bool) -> Prior:
+    """Depths of half the width, the focal length as given; both as weak as so many observations of that noise."""
+    shape = bundle.motion.shape
+    deep = HALF_WIDTH * float(np.sqrt(np.var(shape[:2], axis=1).mean()))
+    excess = float((off_plane(shape)[1] ** 2).mean()) / deep**2
+    depth = (LOOSE + PROOF * h.sum() / len(shape.T) * excess) * (sigma / deep) ** 2
+    focal = FOCAL_PROOF * h.sum() * (sigma / FOCAL_DOUBT) ** 2 if refine and kappa else np.inf
+    return Prior(depth, focal, kappa)
+
+
+def dome(first: Array, bulge: float, kappa: float) -> RigidMotion:
+    """A shallow dome (3, p) that looks as the image (2, p), bulging from (+1) or to (-1) the camera."""
+    middle = first.mean(axis=1)
+    squares = ((first - middle[:, None]) ** 2).sum(axis=0)
+    z = bulge * DOME * (squares.mean() - squares) / np.quantile(squares, 0.9)
+    z = np.clip(z, -DOME, DOME)
+    xy = first * (1 + kappa * z)
+    t = xy.mean(axis=1)
+    return RigidMotion(np.concatenate([xy - t[:, None], z[None]]), np.eye(3)[None], np.ones(1), t[None])
+
+
+def width(shape: Array) -> float:
+    """RMS extent of a shape (3, p) along its main plane, in one coordinate."""
+    values = np.linalg.eigvalsh(np.cov(shape, bias=True))
+    return float(np.sqrt((values[1] + values[2]) / 2))
+
+
+def relief(shape: Array) -> float:
+    """RMS extent of a shape (3, p) off its main plane over that along it."""
+    return float(np.sqrt(np.linalg.eigvalsh(np.cov(shape, bias=True))[0].clip(0))) / width(shape)
+
+
+def describe(W: Array, visible: Visibility, bundle: Bundle, camera: Camera, bulges: tuple[float, float]) -> Solid:
+    """The solid of a bundle in pixels, its spikes smoothed; W and bundle relative to the principal point."""
+    residual = np.where(visible, np.linalg.norm(bundle.image() - W, axis=1), np.nan)
+    focal = 1 / bundle.kappa if bundle.kappa else np.inf
+    motion, trusted = smoothed(W, visible, bundle, residual)
+    turn = view_turn_degrees(motion.R)
+    depth = relief(motion.shape)
+    note = f"solid from {len(W)} keyframes, turned {turn:.0f}°, median residual {np.nanmedian(residual):.2f} px"
+    note += f", relief {depth:.2f} of the width"
+    if turn < TURN_DEGREES:
+        note += f" (hardly turned: relief beyond {HALF_WIDTH:g} is not believed without proof)"
+    return Solid(motion, replace(camera, focal_px=focal), residual, trusted, turn, depth, bulges, note)

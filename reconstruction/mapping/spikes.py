@@ -1,0 +1,130 @@
+"""Spikes of a rigid shape: depths that the views hardly hold are drawn to the plane through their neighbours.
+
+The most likely depths z, of which the views say ẑ_i ± σ_i, on a surface whose vertices are d = D z off their neighbours':
+
+    min Σ_i (z_i − ẑ_i)²/σ_i² + Σ_i d_i²/τ_i²,   τ_i the usual d times the neighbours' distance over the usual one.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import spsolve
+
+from reconstruction.basis.mesh import triangulate
+from reconstruction.basis.modes import principal_axes
+from reconstruction.mapping.bundle import Bundle, derivatives
+from reconstruction.mapping.outliers import usual
+from reconstruction.mapping.rigid import RigidMotion
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Visibility = NDArray[np.bool_]
+
+INLIER_SIGMAS = 3.0  # of the residuals
+LIKE_VIEWS = 4.0  # views whose errors are alike, since what deforms stays so for a while: they count as one
+LEAST_SIGMA = 0.005  # of half the width: less is what anything deforms by
+SHARE = 0.5  # of a point's observations that must agree with the solid
+FEWEST = 3  # of them
+ASIDE = 0.02  # weight of a point that does not move with the solid among the neighbours of one that does
+LEAST = 0.05  # of the usual distance from the neighbours' plane: no depth is surer
+ROUNDS = 3  # of leaving out what is a spike
+LARGEST = 0.8  # times half the width, both RMS, that a vertex may be off its neighbours' plane; 12 % of the width across
+PROVEN = 20.0  # standard deviations of its depth that it may, too: a nose of few points is no spike
+SMOOTHEST = 0.1  # times the same: no surface is believed to be smoother, or creases would be rounded
+
+
+def smoothed(W: Array, visible: Visibility, bundle: Bundle, residual: Array) -> tuple[RigidMotion, Visibility]:
+    """The motion with spikes smoothed, and which points (p,) keep the depth that the views gave them.
+
+    Args:
+        W: (K, 2, p) relative to the principal point.
+        visible: (K, p).
+        bundle: in the first view's axes.
+        residual: (K, p) lengths, NaN where not visible.
+    """
+    axes = principal_axes(bundle.motion.shape)
+    shape = axes.T @ bundle.motion.shape
+    deep = float(np.sqrt(np.var(shape[:2], axis=1).mean())) / 2
+    sigma = usual(residual[visible], LEAST_SIGMA * deep)
+    agrees = visible & (np.nan_to_num(residual, nan=np.inf) < INLIER_SIGMAS * 1.2 * sigma)
+    count = agrees.sum(axis=0)
+    sound = (count >= FEWEST) & (count >= SHARE * visible.sum(axis=0))
+    information = axes.T @ point_information(W, agrees.astype(np.float64), bundle) @ axes
+    own = np.sqrt((np.where(agrees, residual, 0.0) ** 2).sum(axis=0) / count.clip(1) / 2)
+    noise = np.sqrt((own**2 + sigma**2) / 2)
+    spread = np.minimum(depth_variance(information) * noise**2 * LIKE_VIEWS, deep**2)
+
+    def spike(off: Array) -> Visibility:
+        return np.asarray((np.abs(off) > LARGEST * deep) & (np.abs(off) < PROVEN * np.sqrt(spread)))
+
+    for _ in range(ROUNDS):
+        D, distance = off_neighbours_plane(shape[:2], sound)
+        off = np.abs(D @ shape[2])
+        tau = max(float(np.median(off[sound] if sound.any() else off)) / 0.6745, SMOOTHEST * deep)
+        weight = np.where(sound, 1 / (spread + (LEAST * tau) ** 2), 1 / deep**2)
+        stiffness = D.T @ sp.diags_array((np.median(distance) / (tau * distance)) ** 2) @ D
+        z = np.asarray(spsolve((sp.diags_array(weight) + stiffness).tocsc(), weight * shape[2]))
+        sound = sound & ~spike(D @ z)
+    D, _ = off_neighbours_plane(shape[:2], np.ones_like(sound))
+    for _ in range(ROUNDS):  # what smoothing left, most of it at the border
+        off = D @ z
+        far = spike(off)
+        z, sound = z - np.where(far, off, 0.0), sound & ~far
+    return replace(bundle.motion, shape=axes @ (shape + along(information, z - shape[2]))), sound
+
+
+def point_information(W: Array, h: Array, bundle: Bundle) -> Array:
+    """JᵀJ (p, 3, 3) of each point over the views (K, p) that count, poses held."""
+    B = derivatives(W, bundle)[2]
+    return np.asarray(np.einsum("kdcp,kecp->pde", h[:, None, None] * B, B))
+
+
+def depth_variance(information: Array) -> Array:
+    """Variance (p,) of z, x and y free, by unit noise."""
+    xy, z = information[:, :2, :2] + 1e-9 * np.eye(2), information[:, :2, 2:]
+    left = information[:, 2, 2] - (z.transpose(0, 2, 1) @ np.linalg.solve(xy, z))[:, 0, 0]
+    return np.asarray(1 / left.clip(1e-9))
+
+
+def along(information: Array, change: Array) -> Array:
+    """Steps (3, p) that change the depths by so much and the images as little as can be."""
+    xy, z = information[:, :2, :2] + 1e-9 * np.eye(2), information[:, :2, 2:]
+    beside = -np.linalg.solve(xy, z)[:, :, 0].T * change
+    return np.concatenate([beside, change[None]])
+
+
+def off_neighbours_plane(points: Array, sound: Visibility) -> tuple[sp.csr_array, Array]:
+    """D (p, p), so that D z are distances from the planes through the neighbours, and the neighbours' mean distance (p,).
+
+    Neighbours of points (2, p) are those of the Delaunay mesh and theirs. Points that are not sound (p,) hardly count as
+    neighbours, and are compared with the mean of theirs instead: a plane would carry them off beyond the last sound point.
+    """
+    p = points.shape[1]
+    edges = triangulate(points.T).edges
+    near = sp.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(p, p))
+    ring = ((near + near.T) + sp.eye_array(p)).tocsr()
+    i, j = (ring @ ring).tocoo().coords
+    apart = points[:, j] - points[:, i]
+    lengths = np.linalg.norm(apart, axis=0)
+    first = ring.tocoo()
+    own = np.linalg.norm(points[:, first.coords[0]] - points[:, first.coords[1]], axis=0)
+    close = np.bincount(first.coords[0], own, p) / (np.bincount(first.coords[0], minlength=p) - 1).clip(1)
+    close = close.clip(1e-12 * close.max())
+    w = np.where(i == j, 0.0, 1 / (1 + (lengths / close[i]) ** 2)) * np.where(sound[j] | ~sound[i], 1.0, ASIDE)
+    rows = np.stack([np.ones(len(i)), *(apart / close[i])])
+    gram = np.stack([np.bincount(i, w * a * b, p) for a in rows for b in rows], axis=1).reshape(p, 3, 3)
+    height = np.linalg.inv(gram + 1e-6 * np.eye(3))[:, 0]  # of the plane at the vertex itself
+    alone = gram[:, 0, 0] == 0  # on top of another: not in the mesh
+    height = np.where(sound[:, None], height, np.eye(3)[0] / np.where(alone, 1.0, gram[:, 0, 0])[:, None])
+    share = (height[i] * rows.T).sum(axis=1) * w
+    plane = sp.coo_array((share, (i, j)), shape=(p, p))
+    return (sp.diags_array((~alone).astype(np.float64)) - plane).tocsr(), close
+
+
+def worst_spike(shape: Array) -> float:
+    """Largest distance of a vertex (3, p) from its neighbours' plane over the shape's width."""
+    shape = principal_axes(shape).T @ shape
+    D, _ = off_neighbours_plane(shape[:2], np.ones(shape.shape[1], bool))
+    return float(np.abs(D @ shape[2]).max() / np.ptp(shape[:2], axis=1).mean())

@@ -1,0 +1,84 @@
+"""How alike the views of keyframes are: the similarity between each two, and in which order to build on them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction.basis.mesh import farthest_points
+from reconstruction.mapping.outliers import medians
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Visibility = NDArray[np.bool_]
+
+COMPARED = 120  # points: enough to tell views apart
+ROUNDS = 4  # of robust weights
+BESIDE = 7  # views next to the first from which a point's place in it is taken
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """Similarities between all pairs of K views: z_j ≈ a_ij z_i + b_ij, points as complex numbers x + iy.
+
+    Attributes:
+        a, b: (K, K) complex.
+        distance: (K, K) what is left, robustly, in units of image j.
+    """
+
+    a: NDArray[np.complex128]
+    b: NDArray[np.complex128]
+    distance: Array
+
+
+def likeness(W: Array, visible: Visibility) -> Likeness:
+    """Compare all pairs of views (K, 2, p); robust against outliers and missing points."""
+    place = np.where(visible[:, None], W, 0.0).sum(axis=0) / visible.sum(axis=0).clip(1)
+    few = farthest_points(place.T, COMPARED)
+    z = np.where(visible, W[:, 0] + 1j * W[:, 1], 0.0)[:, few]
+    both = (visible[:, None] & visible)[:, :, few]
+    zi, zj = np.broadcast_arrays(z[:, None], z[None])
+    w = both.astype(np.float64)
+    for _ in range(ROUNDS):
+        total = w.sum(axis=2).clip(1e-12)
+        mean_i, mean_j = (w * zi).sum(axis=2) / total, (w * zj).sum(axis=2) / total
+        ci, cj = zi - mean_i[:, :, None], zj - mean_j[:, :, None]
+        size = (w * np.abs(ci) ** 2).sum(axis=2)
+        a = (w * ci.conj() * cj).sum(axis=2) / size.clip(1e-300)
+        off = np.abs(cj - a[:, :, None] * ci)
+        middle = np.nan_to_num(medians(np.where(both, off, np.nan), axis=2))
+        w = both / (1 + (off / (2 * middle + 1e-12)[:, :, None]) ** 2) ** 2
+    return Likeness(a, mean_j - a * mean_i, middle)
+
+
+def building_order(alike: Likeness) -> tuple[Indices, Indices]:
+    """Views (K,): the one in the middle, then always the nearest to those before; and (K,) which of those that is."""
+    K = len(alike.distance)
+    apart = alike.distance + alike.distance.T
+    first = int(np.median(apart, axis=1).argmin())
+    order, parent = [first], [first]
+    nearest, by = apart[first].copy(), np.full(K, first)
+    for _ in range(K - 1):
+        nearest[order] = np.inf
+        new = int(nearest.argmin())
+        order.append(new)
+        parent.append(int(by[new]))
+        closer = apart[new] < nearest
+        nearest[closer], by[closer] = apart[new][closer], new
+    return np.array(order), np.array(parent)
+
+
+def completed(W: Array, visible: Visibility, alike: Likeness, view: int) -> Array:
+    """All points (2, p) as one view should see them: the middle of where the views like it put them."""
+    z = (np.where(visible, W[:, 0] + 1j * W[:, 1], np.nan) - alike.b[view][:, None]) / alike.a[view][:, None]
+    beside = np.argsort(alike.distance[view])
+    near, far = (complex_medians(z[beside[:count]]) for count in (BESIDE, len(z)))
+    best = np.where(np.isfinite(near.real), near, far)
+    best = np.where(np.isfinite(best.real), best, np.nanmean(best))
+    return np.stack([best.real, best.imag])
+
+
+def complex_medians(z: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Medians (p,) of real and imaginary parts of (n, p), NaN where nothing is known."""
+    known = np.isfinite(z.real)
+    return medians(np.where(known, z.real, np.nan), axis=0) + 1j * medians(np.where(known, z.imag, np.nan), axis=0)

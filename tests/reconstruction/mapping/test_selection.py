@@ -1,0 +1,103 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from reconstruction import ReconstructionError
+from reconstruction.camera import Camera
+from reconstruction.mapping.selection import Misfit, decide, select, spread_edges
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, SEEDS, flat, relief, rolled, seen, turns
+
+K, P = 16, 100
+
+
+def keyframes(rng, shapes, camera=PERSPECTIVE, degrees=25.0, noise=0.2):
+    """Points (K, 2, p) px of shapes (K, 3, p), all visible, and the true shapes in camera axes."""
+    W, placed = seen(shapes, turns(K, degrees), camera)
+    return W + noise * rng.normal(size=W.shape), np.ones((K, P), bool), placed
+
+
+def surface_of(W, placed, rng, off=0.3):
+    """What a good maker of sheets would find; `off` px."""
+
+    def surface(w, _visible, _camera):
+        frames = [int(np.abs(W - one).sum(axis=(1, 2)).argmin()) for one in w]
+        return placed[frames] + off * rng.normal(size=(len(w), 3, P))
+
+    return surface
+
+
+@given(SEEDS)
+@settings(max_examples=3, deadline=None)
+def test_a_solid_is_told(rng):
+    W, visible, placed = keyframes(rng, np.repeat(relief(rng, P)[None], K, axis=0))
+    evidence = select(W, visible, PERSPECTIVE, surface_of(W, placed, rng, off=1.0))
+    assert evidence.kind == "solid"
+    assert evidence.sureness > 1.2
+    assert evidence.solid.edges_px == pytest.approx(0.2, rel=0.3)
+    assert "solid" in evidence.note
+
+
+@given(SEEDS)
+@settings(max_examples=3, deadline=None)
+def test_a_card_that_turns_is_flat(rng):
+    W, visible, placed = keyframes(rng, np.repeat(flat(rng, P)[None], K, axis=0))
+    assert select(W, visible, PERSPECTIVE, surface_of(W, placed, rng)).kind == "flat"
+
+
+@given(SEEDS)
+@settings(max_examples=3, deadline=None)
+def test_a_sheet_that_rolls_is_a_sheet(rng):
+    sheet = flat(rng, P)
+    shapes = np.stack([rolled(sheet, 0.008 * np.sin(k)) for k in range(K)])
+    W, visible, placed = keyframes(rng, shapes)
+    evidence = select(W, visible, PERSPECTIVE, surface_of(W, placed, rng))
+    assert evidence.kind == "sheet"
+    assert evidence.length_change < 0.01
+    assert select(W, visible, PERSPECTIVE).kind != "sheet"  # nothing makes one
+
+
+def test_evidence_does_not_depend_on_units():
+    rng = np.random.default_rng(0)
+    W, visible, _ = keyframes(rng, np.repeat(relief(rng, P)[None], K, axis=0))
+    one = select(W, visible, PERSPECTIVE)
+    other = select(W * 1e-3, visible, Camera(PERSPECTIVE.focal_px * 1e-3, PERSPECTIVE.center_px * 1e-3))
+    assert other.kind == one.kind
+    assert other.sureness == pytest.approx(one.sureness, rel=1e-4)
+    assert other.solid.whole_px == pytest.approx(1e-3 * one.solid.whole_px, rel=1e-4)
+
+
+def test_orthographic_keyframes_are_told_without_a_sheet():
+    rng = np.random.default_rng(0)
+    W, visible, _ = keyframes(rng, np.repeat(relief(rng, P)[None], K, axis=0), ORTHOGRAPHIC)
+    evidence = select(W, visible, ORTHOGRAPHIC)
+    assert evidence.kind == "solid"
+    assert np.isnan(evidence.sheet.edges_px)
+
+
+@given(st.floats(0.01, 100))
+def test_what_leaves_least_wins_and_freedom_costs(unit):
+    def made(edges, whole=np.nan):
+        return Misfit(unit * edges, unit * whole)
+
+    assert decide(made(1, 1), made(1, 0.95), made(0.9), 0.4)[0] == "flat"
+    assert decide(made(1, 2), made(0.5, 1), made(0.48), 0.4)[0] == "solid"
+    assert decide(made(1, 2), made(0.5, 1), made(0.48), 0.01)[0] != "solid"
+    assert decide(made(1, 2), made(0.5, 1), made(0.2), 0.4)[0] == "sheet"
+    assert decide(made(1, 2), made(0.5, 1), made(np.nan), 0.4)[0] == "solid"
+
+
+def test_edges_join_neighbours_seen_often():
+    rng = np.random.default_rng(0)
+    W, visible, _ = keyframes(rng, np.repeat(relief(rng, P)[None], K, axis=0))
+    visible[2:, :10] = False
+    edges = spread_edges(W, visible)
+    assert (edges[:, 0] < edges[:, 1]).all()
+    assert edges.min() >= 10
+
+
+def test_too_few_keyframes_say_so():
+    rng = np.random.default_rng(0)
+    W, visible, _ = keyframes(rng, np.repeat(relief(rng, P)[None], K, axis=0))
+    with pytest.raises(ReconstructionError, match="6 keyframes"):
+        select(W[:5], visible[:5], PERSPECTIVE)

@@ -1,0 +1,117 @@
+from dataclasses import replace
+from time import process_time
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from reconstruction import ReconstructionError
+from reconstruction.camera import Camera
+from reconstruction.evaluation import with_missing, with_outliers
+from reconstruction.mapping.solid import bundle_adjust
+from tests.reconstruction.world import CAMERAS, ORTHOGRAPHIC, PERSPECTIVE, SEEDS, relief, seen, shape_error, turns
+
+KEYFRAMES, POINTS = 14, 120
+
+
+def views(rng: np.random.Generator, camera: Camera, degrees: float = 25.0, noise: float = 0.2):
+    """A hilly solid, its keyframes' points and their visibility."""
+    shape = relief(rng, POINTS)
+    W, _ = seen(np.repeat(shape[None], KEYFRAMES, axis=0), turns(KEYFRAMES, degrees), camera)
+    return shape, W + noise * rng.normal(size=W.shape), np.ones((KEYFRAMES, POINTS), bool)
+
+
+@given(SEEDS, CAMERAS)
+@settings(max_examples=4, deadline=None)
+def test_shape_comes_back(rng, camera):
+    shape, W, visible = views(rng, camera)
+    solid = bundle_adjust(W, visible, camera)
+    assert shape_error(solid.shape, shape) < 0.012
+    assert solid.frame_residuals_px.max() < 0.5
+    assert solid.trusted.mean() > 0.95
+
+
+@given(SEEDS, CAMERAS)
+@settings(max_examples=4, deadline=None)
+def test_missing_points_and_outliers(rng, camera):
+    shape, W, visible = views(rng, camera, noise=0.5)
+    visible = with_missing(visible, 0.4, rng)
+    W = np.where(visible[:, None], with_outliers(W, visible, 0.1, rng), np.nan)
+    solid = bundle_adjust(W, visible, camera)
+    assert shape_error(solid.shape[:, solid.trusted], shape[:, solid.trusted]) < 0.05
+
+
+@given(SEEDS, CAMERAS, st.sampled_from([1e-3, 1e3]))
+@settings(max_examples=2, deadline=None)
+def test_units_do_not_matter(rng, camera, factor):
+    _, W, visible = views(rng, camera)
+    other = Camera(camera.focal_px * factor, camera.center_px * factor)
+    a, b = bundle_adjust(W, visible, camera), bundle_adjust(W * factor, visible, other)
+    np.testing.assert_allclose(b.shape, factor * a.shape, rtol=1e-5, atol=1e-5 * factor)
+    np.testing.assert_array_equal(a.trusted, b.trusted)
+
+
+@given(SEEDS)
+@settings(max_examples=4, deadline=None)
+def test_mirrored_picture_gives_the_mirrored_shape(rng):
+    shape, W, visible = views(rng, PERSPECTIVE)
+    centre = PERSPECTIVE.center_px[0]
+    flipped = W.copy()
+    flipped[:, 0] = 2 * centre - W[:, 0]
+    solid = bundle_adjust(flipped, visible, PERSPECTIVE)
+    assert shape_error(solid.shape * np.array([[-1.0], [1.0], [1.0]]), shape) < 0.012
+
+
+def test_perspective_tells_the_bulges_apart_and_orthography_does_not():
+    shape, W, visible = views(np.random.default_rng(1), PERSPECTIVE)
+    solid = bundle_adjust(W, visible, PERSPECTIVE)
+    assert np.corrcoef(solid.shape[2], shape[2])[0, 1] > 0.99
+    _, W, visible = views(np.random.default_rng(1), ORTHOGRAPHIC)
+    first, second = bundle_adjust(W, visible, ORTHOGRAPHIC).bulges
+    assert first == second
+
+
+def test_focal_length_is_refined_where_the_views_hold_it():
+    shape, W, visible = views(np.random.default_rng(5), PERSPECTIVE, degrees=35)
+    rough = replace(PERSPECTIVE, focal_px=1.4 * PERSPECTIVE.focal_px)
+    free, held = (bundle_adjust(W, visible, rough, refine_focal=refine) for refine in (True, False))
+    assert abs(free.camera.focal_px / PERSPECTIVE.focal_px - 1) < 0.1
+    assert held.camera.focal_px == pytest.approx(rough.focal_px)
+    assert shape_error(free.shape, shape) < shape_error(held.shape, shape)
+
+
+def test_a_still_object_has_no_deep_relief():
+    _, W, visible = views(np.random.default_rng(2), PERSPECTIVE, degrees=0.0, noise=0.5)
+    solid = bundle_adjust(W, visible, PERSPECTIVE)
+    assert solid.relief < 0.6
+    assert "hardly turned" in solid.note
+
+
+def test_a_plane_stays_one_if_asked():
+    _, W, visible = views(np.random.default_rng(2), PERSPECTIVE)
+    assert bundle_adjust(W, visible, PERSPECTIVE, flat=True).relief < 0.01
+
+
+def test_large_turns_come_back_from_views_out_of_order():
+    rng = np.random.default_rng(4)
+    shape, W, visible = views(rng, PERSPECTIVE, degrees=50)
+    order = rng.permutation(KEYFRAMES)
+    assert shape_error(bundle_adjust(W[order], visible, PERSPECTIVE).shape, shape) < 0.012
+
+
+def test_a_second_at_most():
+    rng = np.random.default_rng(0)
+    shape = relief(rng, 400)
+    W, _ = seen(np.repeat(shape[None], 24, axis=0), turns(24), PERSPECTIVE)
+    began = process_time()
+    bundle_adjust(W + 0.2 * rng.normal(size=W.shape), np.ones((24, 400), bool), PERSPECTIVE)
+    assert process_time() - began < 3.0  # 0.6 s on an idle machine
+
+
+def test_too_few_views_or_points_say_so():
+    _, W, visible = views(np.random.default_rng(0), PERSPECTIVE)
+    with pytest.raises(ReconstructionError, match="3 keyframes"):
+        bundle_adjust(W[:2], visible[:2], PERSPECTIVE)
+    with pytest.raises(ReconstructionError, match="6 points"):
+        bundle_adjust(W[:, :, :5], visible[:, :5], PERSPECTIVE)

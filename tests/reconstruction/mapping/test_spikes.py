@@ -1,0 +1,43 @@
+import numpy as np
+
+from reconstruction.evaluation import with_outliers
+from reconstruction.mapping.solid import bundle_adjust
+from reconstruction.mapping.spikes import off_neighbours_plane, worst_spike
+from tests.reconstruction.world import PERSPECTIVE, relief, seen, shape_error, spread, turns
+
+
+def test_a_plane_is_on_its_neighbours_plane():
+    points = spread(np.random.default_rng(0), 80)
+    D, distance = off_neighbours_plane(points, np.ones(80, bool))
+    np.testing.assert_allclose(D @ (3 * points[0] - 2 * points[1] + 5), 0, atol=1e-3)
+    assert (distance > 0).all()
+
+
+def test_a_vertex_out_of_its_neighbours_plane_shows():
+    points = spread(np.random.default_rng(0), 80)
+    D, _ = off_neighbours_plane(points, np.ones(80, bool))
+    z = np.zeros(80)
+    z[40] = 1.0
+    assert (D @ z)[40] == max(D @ z) > 0.9
+
+
+def test_points_on_top_of_each_other():
+    points = spread(np.random.default_rng(0), 80)
+    points[:, 1] = points[:, 0]
+    D, _ = off_neighbours_plane(points, np.ones(80, bool))
+    assert np.isfinite(D.toarray()).all()
+
+
+def test_points_that_do_not_move_with_the_solid_take_their_neighbours_depth():
+    rng = np.random.default_rng(6)
+    shape = relief(rng, 150)
+    W, _ = seen(np.repeat(shape[None], 14, axis=0), turns(14), PERSPECTIVE)
+    wild = np.arange(0, 150, 25)
+    visible = np.ones((14, 150), bool)
+    W[:, :, wild] = with_outliers(W, visible, 1.0, rng)[:, :, wild]
+    solid = bundle_adjust(W, visible, PERSPECTIVE)
+    assert not solid.trusted[wild].any()
+    tame = np.setdiff1d(np.arange(150), wild)
+    assert solid.trusted[tame].mean() > 0.95
+    assert shape_error(solid.shape[:, tame], shape[:, tame]) < 0.02
+    assert worst_spike(solid.shape) < 0.15

@@ -1,0 +1,31 @@
+import numpy as np
+from hypothesis import given, settings
+
+from reconstruction.mapping.views import building_order, completed, likeness
+from tests.reconstruction.world import SEEDS, spread
+
+
+@given(SEEDS)
+@settings(max_examples=20, deadline=None)
+def test_similarities_come_back_despite_outliers_and_missing_points(rng):
+    x = spread(rng, 60)
+    a = np.exp(1j * rng.uniform(-np.pi, np.pi, 5)) * rng.uniform(0.5, 2, 5)
+    b = rng.normal(size=5) + 1j * rng.normal(size=5)
+    z = a[:, None] * (x[0] + 1j * x[1]) + b[:, None]
+    W, visible = np.stack([z.real, z.imag], axis=1), rng.random((5, 60)) > 0.2
+    wrong = rng.random((5, 60)) < 0.08
+    W = np.where(wrong[:, None], rng.uniform(-100, 100, W.shape), W)
+    alike = likeness(W, visible)
+    np.testing.assert_allclose(alike.a, a[None] / a[:, None], rtol=0.02)
+    first = completed(W, visible, alike, 0)
+    clean = np.array([z[0].real, z[0].imag])
+    assert np.median(np.abs(first - clean)) < 0.05 * np.abs(clean).max()
+
+
+def test_a_path_of_views_is_followed_from_its_middle():
+    x = spread(np.random.default_rng(0), 50)
+    W = np.stack([x * np.array([[1 - 0.1 * k], [1.0]]) for k in range(7)])
+    order, parent = building_order(likeness(W, np.ones((7, 50), bool)))
+    assert sorted(order) == list(range(7))
+    assert order[0] in (2, 3, 4)
+    assert (np.abs(order - parent)[1:] == 1).all()
