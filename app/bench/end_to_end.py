@@ -91,8 +91,8 @@ def many_points(say: Say) -> tuple[int, float]:
 
 def evaluate_many() -> int:
     """Tracks of a surface that turns, reconstructed from its first true shape; returns the number of points."""
+    from app.options.evaluate import Evaluate
     from app.options.model import Model
-    from app.options.run import Evaluate
     from app.pipeline.evaluate import evaluate
     from app.rivals.problems import FOCAL_PX, surface
     from app.terminal.progress import Progress

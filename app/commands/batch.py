@@ -16,7 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from app.commands.batch_job import UNFINISHED, Job, Words, carry_out
+from app.commands.batch_job import UNFINISHED, Job, carry_out
 from app.files.writing import writable
 from app.options.batch import Batch
 from app.terminal.errors import UsageError
@@ -33,7 +33,7 @@ CONNECT_S = 5.0
 class Outcome(Summary):
     """What came of all videos, those done before included: summary or error, by name."""
 
-    videos: list[Words]
+    videos: list[dict[str, object]]
     skipped: int
     failed: int
     interrupted: bool
@@ -62,7 +62,7 @@ def batch(command: Batch, progress: Progress) -> Outcome:
         UsageError: the folder cannot be written, or there is no such scheduler.
     """
     jobs = make_jobs(command)
-    results: dict[str, Words] = {}
+    results: dict[str, dict[str, object]] = {}
     for job in jobs:
         before = job.done()
         if before is not None and not (command.retry and "error" in before):
@@ -114,12 +114,12 @@ def make_jobs(command: Batch) -> list[Job]:
     return found
 
 
-def here(jobs: list[Job], at_a_time: int | None) -> Iterator[tuple[Job, Words]]:
+def here(jobs: list[Job], at_a_time: int | None) -> Iterator[tuple[Job, dict[str, object]]]:
     """Carry jobs out on this machine, so many at a time; an interrupt ends them all."""
     processes: list[subprocess.Popen[str]] = []
     stopping = threading.Event()
 
-    def guarded(job: Job) -> Words:
+    def guarded(job: Job) -> dict[str, object]:
         if stopping.is_set():
             return {"source": job.video, "error": "interrupted"}
         try:
@@ -140,7 +140,7 @@ def here(jobs: list[Job], at_a_time: int | None) -> Iterator[tuple[Job, Words]]:
             raise
 
 
-def on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[Job, Words]]:
+def on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[Job, dict[str, object]]]:
     """Carry jobs out on the workers of a Dask scheduler.
 
     Raises:
@@ -162,7 +162,7 @@ def on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[Job, Words]]:
             yield job, {"source": job.video, "error": str(failure)} if failure else future.result()
 
 
-def write_csv(path: Path, told: list[Words]) -> None:
+def write_csv(path: Path, told: list[dict[str, object]]) -> None:
     """The same as a file."""
     with writable(path) as file, io.TextIOWrapper(file, "utf-8", newline="") as text:
         rows = csv.DictWriter(text, ("name", "source", *COLUMNS, "recording", "error"), extrasaction="ignore")

@@ -11,8 +11,6 @@ from pathlib import Path
 from app.files.writing import write_json
 from app.terminal.exit_code import ExitCode
 
-Words = dict[str, object]
-
 UNFINISHED = "unfinished"
 
 
@@ -44,7 +42,7 @@ class Job:
         """Its summary, or what went wrong."""
         return self.folder / f"{self.name}.json"
 
-    def done(self) -> Words | None:
+    def done(self) -> dict[str, object] | None:
         """The report of an earlier batch on the same video; None if there is none."""
         try:
             words = json.loads(self.report.read_text())
@@ -54,7 +52,7 @@ class Job:
         return words if mine and ("error" in words or self.recording.exists()) else None
 
 
-def carry_out(job: Job, started: Callable[["subprocess.Popen[str]"], None] = lambda _: None) -> Words:
+def carry_out(job: Job, started: Callable[["subprocess.Popen[str]"], None] = lambda _: None) -> dict[str, object]:
     """Run the video in another process; returns its summary, or source and error.
 
     What was asked for and cannot be done is remembered; what ended otherwise is tried again by the next batch.
@@ -85,7 +83,7 @@ def carry_out(job: Job, started: Callable[["subprocess.Popen[str]"], None] = lam
             unfinished.unlink(missing_ok=True)
             write_json(job.report, {"source": job.video, "error": error})
         return {"source": job.video, "error": error}
-    words: Words = json.loads(out)
+    words: dict[str, object] = json.loads(out)
     unfinished.replace(job.recording)
     words |= {"source": job.video, "recording": str(job.recording)}
     for number in range(2, int(str(words.get("parts", 1))) + 1):

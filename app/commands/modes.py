@@ -9,8 +9,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from app.files.writing import check_free, writable
-from app.options.export import Modes
-from app.options.run import Evaluate
+from app.options.evaluate import Evaluate
+from app.options.modes import Modes
 from app.recording.modes_figure import modes_figure, spectrum, title_of
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary

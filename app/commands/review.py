@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.files.writing import check_free, writable
-from app.options.run import Review
+from app.options.review import Review
 from app.playback.facts import Facts, facts
 from app.playback.measures import Reviewed, per_frame, reviewed
 from app.playback.playback import Playback

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import tyro
 
+from app.options.shared import Json
 from app.terminal.errors import UsageError
 
 
 @dataclass(frozen=True)
-class Batch:
+class Batch(Json):
     """Run many videos, each in a process of its own, into one folder.
 
     Each gives NAME.rrd and NAME.json, its summary or what went wrong; summary.csv lists all. Videos that are done
@@ -33,8 +34,6 @@ class Batch:
     """Also run again what failed before."""
     scheduler: str | None = None
     """Address of a Dask scheduler (tcp://host:8786) whose workers do it; they need modeshape, and the same files."""
-    json: bool = False
-    """Print the summary as JSON on stdout."""
 
     def __post_init__(self) -> None:
         if not self.videos:

@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.options.shared import Json, Overwrite
 from app.terminal.errors import UsageError
 
 
 @dataclass(frozen=True)
-class Bench:
+class Bench(Json, Overwrite):
     """How fast: window step, basis and whole runs, beside SciPy, Ceres, modal analysis and a bare OpenCV loop.
 
     Ceres takes part where pyceres is installed: pip install 'modeshape[bench]'.
@@ -23,10 +24,6 @@ class Bench:
     """Draw times against the number of points as .png, .pdf or .svg."""
     readme: Path | None = None
     """Write the table of ratios into this file, between its two marks."""
-    overwrite: bool = False
-    """Replace an existing --plot."""
-    json: bool = False
-    """Print everything as JSON on stdout."""
 
     def __post_init__(self) -> None:
         if self.plot is not None and self.plot.suffix.lower() not in (".png", ".pdf", ".svg"):

@@ -1,17 +1,17 @@
-"""What a person can choose of `export` and `modes`; nothing heavy is imported here, so that `--help` is instant."""
+"""What a person can choose of `export`; nothing heavy is imported here, so that `--help` is instant."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 import tyro
 
-from app.options.model import Model
+from app.options.shared import Json, Overwrite
 from app.terminal.errors import UsageError
 
 
 @dataclass(frozen=True)
-class Export:
+class Export(Json, Overwrite):
     """A recording as files for other programs, from the .rrd alone.
 
     Formats:
@@ -43,10 +43,6 @@ class Export:
     """File, or folder for obj, ply and csv; without it beside the recording and named after it."""
     axes: Literal["camera", "y-up"] = "camera"
     """Of obj and ply."""
-    overwrite: bool = False
-    """Replace what an earlier export wrote."""
-    json: bool = False
-    """Print what was written as JSON on stdout."""
 
     def __post_init__(self) -> None:
         ending = self.out.suffix.lower().lstrip(".") if self.out else ""
@@ -60,38 +56,3 @@ class Export:
     def kind(self) -> str:
         """The format, given or told by the ending."""
         return self.format or (self.out.suffix.lower().lstrip(".") if self.out else "")
-
-
-@dataclass(frozen=True)
-class Modes:
-    """Draw the mode shapes of a rest shape: the leading modes in and out of the plane, and the eigenvalues.
-
-    A recording shows the modes it was made with. For tracks, rest shape and modes are found as by `evaluate`,
-    with the options below.
-
-    Examples:
-      modeshape modes recordings/demo.rrd --out modes.png
-      modeshape modes tracks.npz --rest-shape first-truth --metric manhattan
-    """
-
-    source: tyro.conf.Positional[Path]
-    """A recording (.rrd) or tracks (.npz)."""
-    out: Path = Path("modes.png")
-    """The figure, a PNG."""
-    overwrite: bool = False
-    """Replace an existing file."""
-    columns: int = 5
-    """Modes shown."""
-    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|first-truth|PATH")] = "auto"
-    """Where the rest shape of tracks comes from: the first frames, the first true shape, or a mesh file."""
-    camera: Literal["auto", "perspective", "orthographic"] = "auto"
-    """Auto: perspective if the tracks have K, else orthographic."""
-    json: bool = False
-    """Print the eigenvalues and what they come from as JSON on stdout."""
-    model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.columns <= 12:
-            raise UsageError(f"--columns {self.columns} does not fit: give 1 to 12")
-        if self.out.suffix.lower() != ".png":
-            raise UsageError(f"--out {self.out} is no PNG: let it end in .png")

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, get_args
 
 import tyro
 
+from app.options.shared import Json
 from app.terminal.errors import UsageError
 
 Name = Literal[
@@ -25,7 +26,7 @@ NAMES: tuple[str, ...] = get_args(Name)
 
 
 @dataclass(frozen=True)
-class Reproduce:
+class Reproduce(Json):
     """Repeat the paper's experiments: figures and tables (Markdown, JSON), each beside what others published.
 
     OUT/report.md and report.json hold the tables, OUT/figures the figures, OUT/footage pictures that show other
@@ -47,8 +48,6 @@ class Reproduce:
     """Fewer settings, one seed, fewer frames: for a first look."""
     readme: Path | None = None
     """File whose table between two marker comments is replaced by the report's headlines."""
-    json: bool = False
-    """Print the report as JSON on stdout."""
 
     def __post_init__(self) -> None:
         if not self.data.is_dir():

@@ -1,4 +1,4 @@
-"""What a person can choose; nothing heavy is imported here, so that `--help` is instant."""
+"""What a person can choose of `run`; nothing heavy is imported here, so that `--help` is instant."""
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -7,19 +7,16 @@ from typing import Annotated, Literal
 import tyro
 
 from app.options.model import Model, priors_text
+from app.options.shared import Json, Overwrite
 from app.terminal.errors import UsageError
-
-Words = dict[str, object]
 
 
 @dataclass(frozen=True)
-class Output:
+class Output(Json, Overwrite):
     """Where results go."""
 
     out: Path | None = None
     """The recording; without it recordings/NAME.rrd, numbered if that exists."""
-    overwrite: bool = False
-    """Replace existing files."""
     tracks_out: Path | None = None
     """Save the tracked points as .npz: W (F, 2, P), visible (F, P); those of later objects in NAME-object2.npz, …"""
     shapes_out: Path | None = None
@@ -34,8 +31,6 @@ class Output:
     """Open the viewer and watch live."""
     connect: str | None = None
     """Address (host:port) of a running viewer to watch live in."""
-    json: bool = False
-    """Print the summary as JSON on stdout."""
 
     def __post_init__(self) -> None:
         if self.split_minutes is not None:
@@ -47,7 +42,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Source:
-    """What is reconstructed from: the options that `run` and a live `retexture` share."""
+    """What is reconstructed from: the options that `run` and `retexture` share."""
 
     source: tyro.conf.Positional[str]
     """Video file, image pattern (img%04d.png), camera index or URL."""
@@ -67,6 +62,10 @@ class Source:
     """Where the rest shape comes from: the first frames (a turning object: rigid; a flat sheet: plane), or a mesh file."""
     camera: Literal["perspective", "orthographic"] = "perspective"
     """How the picture came about."""
+    place: tuple[int, int, int, int] | None = None
+    """Where --texture lies in the first frame: X Y WIDTH HEIGHT in pixels; without it over the whole mesh."""
+    opacity: float = 1.0
+    """Of --texture, 0 to 1."""
     model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
 
     def __post_init__(self) -> None:
@@ -74,6 +73,11 @@ class Source:
             raise UsageError(f"--points {self.points} is too few: give 4 and more")
         if self.duration is not None and not self.duration > 0:
             raise UsageError(f"--duration {self.duration} is no time: give seconds, more than 0")
+        if self.place is not None and min(self.place[2:]) < 1:
+            area = " ".join(map(str, self.place))
+            raise UsageError(f"--place {area} has no area: give X Y WIDTH HEIGHT, both sizes 1 and more")
+        if not 0 <= self.opacity <= 1:
+            raise UsageError(f"--opacity {self.opacity} is no opacity: give 0 to 1")
 
     @property
     def frame_range(self) -> tuple[int, int | None]:
@@ -102,112 +106,12 @@ class Run(Source):
     texture: Path | None = None
     """Picture (or video: its first) painted on the first object's mesh in recording and viewer; for a video of it:
     modeshape retexture."""
-    place: tuple[int, int, int, int] | None = None
-    """Where --texture lies in the first frame: X Y WIDTH HEIGHT in pixels; without it over the whole mesh."""
-    opacity: float = 1.0
-    """Of --texture, 0 to 1."""
     output: tyro.conf.OmitArgPrefixes[Output] = Output()
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_laid(self.place, self.opacity)
 
     @property
     def json(self) -> bool:
         """Whether the summary is printed as JSON."""
         return self.output.json
-
-
-@dataclass(frozen=True)
-class Evaluate:
-    """Reconstruct from given tracks and score against the truth in the file.
-
-    Examples:
-      modeshape evaluate tracks.npz --rest-shape first-truth --deformation bending
-      modeshape evaluate tracks.npz --missing 0.4 --seed 0 --json
-    """
-
-    tracks: tyro.conf.Positional[Path]
-    """Tracks (.npz): W (F, 2, P), visible (F, P), and K, S_gt, gt_frames where known."""
-    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|first-truth|PATH")] = "auto"
-    """Where the rest shape comes from: the first frames, the first true shape, or a mesh file."""
-    camera: Literal["auto", "perspective", "orthographic"] = "auto"
-    """Auto: perspective if the file has K, else orthographic."""
-    missing: float = 0.0
-    """Share of the entries hidden at random."""
-    noise: float = 0.0
-    """Gaussian noise, as a share of the largest distance of a point to the centroid."""
-    outliers: float = 0.0
-    """Share of the entries put anywhere among the others."""
-    seed: int = 0
-    """Of the noise, the hidden entries and the outliers."""
-    shapes_out: Path | None = None
-    """Save the shapes as .npz: S (F, 3, P) camera axes, R, s, t, Lambda, faces, visible."""
-    overwrite: bool = False
-    """Replace existing files."""
-    json: bool = False
-    """Print the scores as JSON on stdout."""
-    model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
-
-    def __post_init__(self) -> None:
-        if not 0 <= self.missing < 1:
-            raise UsageError(f"--missing {self.missing} is no share: give 0 to less than 1")
-        if not 0 <= self.outliers < 1:
-            raise UsageError(f"--outliers {self.outliers} is no share: give 0 to less than 1")
-        if self.noise < 0:
-            raise UsageError(f"--noise {self.noise} is no noise level: give 0 and more")
-        if self.seed < 0:
-            raise UsageError(f"--seed {self.seed} is no seed: give 0 and more")
-
-
-@dataclass(frozen=True)
-class Demo:
-    """Render the sample video, reconstruct it, score it against its truth and record it to recordings/demo.rrd."""
-
-    view: bool = False
-    """Open the viewer and watch live."""
-    json: bool = False
-    """Print the summary as JSON on stdout."""
-
-
-@dataclass(frozen=True)
-class Review:
-    """What is in a recording: a table, JSON, CSV, a figure, or the viewer; of two recordings side by side.
-
-    Examples:
-      modeshape review recordings/demo.rrd
-      modeshape review recordings/demo.rrd --plot demo.png --csv demo.csv
-      modeshape review recordings/paper.rrd recordings/paper-2.rrd --view
-    """
-
-    recording: tyro.conf.Positional[Path]
-    """The recording (.rrd); one of a killed run will do."""
-    other: tyro.conf.Positional[Path | None] = None
-    """Another one to compare it with."""
-    csv: Path | None = None
-    """Write a row per frame: phase, points seen, lost and recovered, errors, milliseconds, pose, sizes of Λ's rows."""
-    plot: Path | None = None
-    """Draw errors, points seen, Λ over time, times and eigenvalues as .png, .pdf or .svg."""
-    overwrite: bool = False
-    """Replace existing files."""
-    view: bool = False
-    """Open the viewer; two recordings are shown side by side."""
-    connect: str | None = None
-    """Address (host:port) of a running viewer to show it in."""
-    json: bool = False
-    """Print the facts as JSON on stdout; of two recordings as a list in "recordings"."""
-
-
-def check_laid(place: tuple[int, int, int, int] | None, opacity: float) -> None:
-    """See to it that a picture can lie there.
-
-    Raises:
-        UsageError: it cannot.
-    """
-    if place is not None and (place[2] < 1 or place[3] < 1):
-        raise UsageError(f"--place {' '.join(map(str, place))} has no area: give X Y WIDTH HEIGHT, both sizes 1 and more")
-    if not 0 <= opacity <= 1:
-        raise UsageError(f"--opacity {opacity} is no opacity: give 0 to 1")
 
 
 def parse_range(text: str) -> tuple[int, int | None]:
@@ -228,14 +132,14 @@ def parse_range(text: str) -> tuple[int, int | None]:
     return a, b
 
 
-def as_words(config: Run | Evaluate) -> Words:
-    """The configuration as a flat dictionary, as it is stored in a recording."""
-    words = asdict(config)
-    model = words.pop("model")
+def configuration(config: Run) -> dict[str, object]:
+    """The options by name, without groups, as they are stored in a recording."""
+    chosen = asdict(config)
+    model = chosen.pop("model")
     model["priors"] = priors_text(model["priors"])
     chosen_above = ("rest_shape", "estimate_focal")
-    words.update({name: value for name, value in model.items() if name not in chosen_above} | words.pop("output", {}))
+    chosen |= {name: value for name, value in model.items() if name not in chosen_above} | chosen.pop("output")
     return {
         name: list(v) if isinstance(v, tuple) else v if isinstance(v, int | float | None) else str(v)
-        for name, v in words.items()
+        for name, v in chosen.items()
     }

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from app.files.mesh_file import rest_of_vertices
 from app.files.writing import check_free
-from app.options.run import Evaluate
+from app.options.evaluate import Evaluate
 from app.pipeline.estimates import Collected, Scores, save_shapes
 from app.pipeline.prepare import RECOVERED, settings_of
 from app.terminal.errors import UsageError

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from app.files.writing import writable
-from app.options.run import Run, as_words
+from app.options.run import Run, configuration
 from app.painting.compositing import Placement, painted
 from app.painting.picture import first_picture
 from app.pipeline.estimates import Collected, save_shapes
@@ -94,7 +94,7 @@ class TrackedObject:
         """What a `Recording` of it takes beside the path."""
         output, (height, width) = self.config.output, self.first.image.shape[:2]
         return {
-            "configuration": as_words(self.config),
+            "configuration": configuration(self.config),
             "size": (width, height),
             "connect": output.connect,
             "view": output.view,

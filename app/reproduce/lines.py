@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.options.evaluate import Evaluate
 from app.options.model import Model
-from app.options.run import Evaluate
 from reconstruction.settings import MetricChoice
 
 

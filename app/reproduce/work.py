@@ -10,7 +10,7 @@ from typing import Self
 from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
 
-from app.options.run import Evaluate, Words
+from app.options.evaluate import Evaluate
 from app.pipeline.evaluate import evaluate
 from app.reproduce.part import Part
 from app.terminal.errors import in_a_line
@@ -34,7 +34,7 @@ class Effort:
 class Trial:
     """One evaluation: its scores, or why there are none."""
 
-    words: Words
+    words: dict[str, object]
     failure: str = ""
 
     def __getitem__(self, name: str) -> float | None:

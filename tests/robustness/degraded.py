@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from app.options.run import Output, Run, Words
+from app.options.run import Output, Run
 from app.pipeline.session import Session
 from app.terminal.progress import Progress
 from reconstruction.basis.mesh import mesh_from_faces
@@ -36,7 +36,7 @@ class Result:
         visible: (F, P) points seen, by frame.
     """
 
-    words: Words
+    words: dict[str, object]
     frames: NDArray[np.int64]
     e3d: Array
     visible: NDArray[np.bool_]

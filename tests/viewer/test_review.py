@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.commands.review import review
-from app.options.run import Review
+from app.options.review import Review
 from app.terminal.progress import Progress
 from tests.synthetic_run import CORNERS_BGR, write_run
 from tests.viewer.conftest import Viewer

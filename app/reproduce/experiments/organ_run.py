@@ -3,8 +3,8 @@
 import numpy as np
 
 from app.arrays import Array
+from app.options.evaluate import Evaluate
 from app.options.model import Model
-from app.options.run import Evaluate
 from app.reproduce.chart import Panel, Series, charts
 from app.reproduce.experiment import Experiment
 from app.reproduce.experiments.organ import NOISE_PX, POINTS, REST_FRAMES, organ_tracks

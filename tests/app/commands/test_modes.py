@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from app.commands.modes import modes
-from app.options.export import Modes
 from app.options.model import Model
+from app.options.modes import Modes
 from app.options.run import Output
 from app.options.run import Run as Asked
 from app.pipeline.session import Session

@@ -12,7 +12,7 @@ import pytest
 
 from app.commands.cli import carry_out
 from app.commands.review import review
-from app.options.run import Review
+from app.options.review import Review
 from app.playback.facts import worst_frames
 from app.playback.measures import measures, reviewed
 from app.playback.playback import Playback

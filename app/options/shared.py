@@ -1,0 +1,35 @@
+"""Groups of options that several commands share; nothing heavy is imported here, so that `--help` is instant."""
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+import tyro
+
+from app.options.model import Model
+
+
+@dataclass(frozen=True, kw_only=True)
+class Json:
+    """How the summary is printed."""
+
+    json: bool = False
+    """Print the summary as JSON on stdout."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Overwrite:
+    """What happens to files of the same names."""
+
+    overwrite: bool = False
+    """Replace existing files."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FromTracks:
+    """How given tracks are reconstructed."""
+
+    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|first-truth|PATH")] = "auto"
+    """Where the rest shape of tracks comes from: the first frames, the first true shape, or a mesh file."""
+    camera: Literal["auto", "perspective", "orthographic"] = "auto"
+    """Auto: perspective if the tracks have K, else orthographic."""
+    model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
