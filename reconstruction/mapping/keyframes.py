@@ -1,10 +1,8 @@
 """A few keyframes of a whole video: those whose images differ most, chosen while it runs, in bounded memory."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Visibility = NDArray[np.bool_]
+from reconstruction.arrays import Array, Indices, Mask
 
 KEYFRAMES = 30
 FEWEST_SHARED = 12  # points that two frames must share to be compared
@@ -32,10 +30,10 @@ class Keyframes:
         self.frames: list[int] = []
         self.version = 0
         self._W: list[Array] = []
-        self._visible: list[Visibility] = []
+        self._visible: list[Mask] = []
         self._apart = np.zeros((0, 0))
 
-    def offer(self, frame: int, W: Array, visible: Visibility) -> bool:
+    def offer(self, frame: int, W: Array, visible: Mask) -> bool:
         """Take a frame's points (2, p) px with visibility (p,), if they differ from those there are; whether it was."""
         if visible.mean() < FEWEST_SEEN:
             return False
@@ -55,13 +53,13 @@ class Keyframes:
             self._drop(nearest_pair(self._apart)[1])
         return True
 
-    def differences(self, W: Array, visible: Visibility) -> Array:
+    def differences(self, W: Array, visible: Mask) -> Array:
         """How much an image (2, p) differs from each keyframe, see `difference`."""
         if not self._W:
             return np.zeros(0)
         return difference(W, visible, np.stack(self._W), np.stack(self._visible))
 
-    def spread(self, count: int | None = None) -> tuple[Array, Visibility, NDArray[np.int64]]:
+    def spread(self, count: int | None = None) -> tuple[Array, Mask, Indices]:
         """Points (F, 2, p) px, NaN where not visible, visibility (F, p) and numbers (F,), most different ones first."""
         order = farthest_first(self._apart, count or len(self.frames))
         W, visible = np.stack(self._W)[order], np.stack(self._visible)[order]
@@ -72,7 +70,7 @@ class Keyframes:
         self._apart = np.delete(np.delete(self._apart, k, axis=0), k, axis=1)
 
 
-def difference(W: Array, visible: Visibility, others: Array, others_visible: Visibility) -> Array:
+def difference(W: Array, visible: Mask, others: Array, others_visible: Mask) -> Array:
     """Robust RMS difference (F,) of an image (2, p) from others (F, 2, p) beyond a shift, over the image's RMS radius.
 
     Infinite where they share too few points.
@@ -100,7 +98,7 @@ def nearest_pair(apart: Array) -> tuple[int, int, float]:
     return int(i[k]), int(j[k]), float(apart[i[k], j[k]])
 
 
-def farthest_first(apart: Array, count: int) -> NDArray[np.int64]:
+def farthest_first(apart: Array, count: int) -> Indices:
     """Order of things so far apart (F, F): the one farthest from all others, then always the farthest from those before."""
     finite = np.minimum(apart, 10 * apart[np.isfinite(apart)].max(initial=1e-12))
     order = [int(finite.sum(axis=1).argmax())]

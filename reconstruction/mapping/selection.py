@@ -14,22 +14,20 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from reconstruction import ReconstructionError
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.camera import Camera
-from reconstruction.mapping.adjustment import Adjustment, adjust
-from reconstruction.mapping.bundle import Bundle, Loss, Prior
-from reconstruction.mapping.outliers import medians, usual
-from reconstruction.mapping.solid import FEWEST_VIEWS, TAIL_SIGMAS, Solid, bundle_adjust
+from reconstruction.mapping.outliers import medians
+from reconstruction.mapping.solid.adjustment import Adjustment, adjust
+from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior
+from reconstruction.mapping.solid.solid import FEWEST_VIEWS, TAIL_SIGMAS, Solid, bundle_adjust
+from reconstruction.window.robust import deviation
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Visibility = NDArray[np.bool_]
 Kind = Literal["flat", "solid", "sheet"]
-Surface = Callable[[Array, Visibility, Camera], Array]
+Surface = Callable[[Array, Mask, Camera], Array]
 """Shapes (K, 3, p) of a sheet of one metric in keyframes (K, 2, p) px, visible (K, p); NaN for points left out."""
 
 COMPARED = 80  # points
@@ -87,7 +85,7 @@ class Evidence:
         return f"{self.kind}: left over on other keyframes {left}{lengths}; {solid}"
 
 
-def select(W: Array, visible: Visibility, camera: Camera, surface: Surface | None = None) -> Evidence:
+def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = None) -> Evidence:
     """Which kind of object keyframes (K, 2, p) px with visibility (K, p) show.
 
     Args:
@@ -132,7 +130,7 @@ def decide(flat: Misfit, solid: Misfit, sheet: Misfit, relief: float) -> tuple[K
     return rigid, float(min(max(gain, 1 / gain), against_sheet))
 
 
-def rigid_misfit(models: list[Solid], seen: list[tuple[Array, Visibility]], camera: Camera, edges: Indices) -> Misfit:
+def rigid_misfit(models: list[Solid], seen: list[tuple[Array, Mask]], camera: Camera, edges: Indices) -> Misfit:
     """Of rigid shapes of the two halves of the keyframes, each on the other half."""
     i, j = edges.T
     single, between = [], []
@@ -144,13 +142,13 @@ def rigid_misfit(models: list[Solid], seen: list[tuple[Array, Visibility]], came
     return Misfit(rms(between), rms(single))
 
 
-def sheet_misfit(shapes: list[Array], seen: list[tuple[Array, Visibility]], edges: Indices) -> tuple[Misfit, float]:
+def sheet_misfit(shapes: list[Array], seen: list[tuple[Array, Mask]], edges: Indices) -> tuple[Misfit, float]:
     """Of sheets (K, 3, p) of the two halves of the keyframes, each on the other half; and the change of lengths.
 
     Raises:
         ReconstructionError: the sheets have no edge in common.
     """
-    known: Visibility = np.asarray(np.isfinite(np.concatenate(shapes)).all(axis=(0, 1)))
+    known: Mask = np.asarray(np.isfinite(np.concatenate(shapes)).all(axis=(0, 1)))
     i, j = edges[known[edges].all(axis=1)].T
     if not i.size:
         raise ReconstructionError("no edge is known in both halves of the keyframes")
@@ -166,7 +164,7 @@ def sheet_misfit(shapes: list[Array], seen: list[tuple[Array, Visibility]], edge
     return Misfit(rms(pixels), np.nan), rms(changes)
 
 
-def spread_edges(W: Array, visible: Visibility) -> Indices:
+def spread_edges(W: Array, visible: Mask) -> Indices:
     """Edges (n, 2) between well-spread points and those beside them, of points seen in most keyframes."""
     share = visible.mean(axis=0)
     often = np.flatnonzero(share >= min(OFTEN, float(np.median(share))))
@@ -180,7 +178,7 @@ def spread_edges(W: Array, visible: Visibility) -> Indices:
     return np.asarray(few[np.unique(pairs[pairs[:, 0] < pairs[:, 1]], axis=0)])
 
 
-def image_in(solid: Solid, W: Array, visible: Visibility, camera: Camera) -> Array:
+def image_in(solid: Solid, W: Array, visible: Mask, camera: Camera) -> Array:
     """Image (K, 2, p) px of a solid in other keyframes, posed as fits best, starting as the view most alike."""
     W, h = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None], visible.astype(np.float64)
     bundle = Bundle(solid.motion, 1 / solid.camera.focal_px)
@@ -196,7 +194,7 @@ def image_in(solid: Solid, W: Array, visible: Visibility, camera: Camera) -> Arr
     padded, counting = np.concatenate([W[:1], W]), np.concatenate([np.zeros((1, W.shape[2])), h])
     for _ in range(ROUNDS):
         off = np.linalg.norm(bundle.image() - padded, axis=1)[counting > 0]
-        loss = Loss(TAIL_SIGMAS * usual(off, 1e-9 * float(np.abs(motion.shape).max())), redescending=False)
+        loss = Loss(TAIL_SIGMAS * deviation(off, 1e-9 * float(np.abs(motion.shape).max())), redescending=False)
         bundle, _ = adjust(padded, counting, bundle, loss, Prior(0.0, np.inf, bundle.kappa), POSES)
     return bundle.image()[1:] + camera.center_px[:, None]
 

@@ -3,13 +3,10 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
-from reconstruction.mapping.smooth_field import SmoothField, smooth_field
-
-Array = NDArray[np.float64]
-Visibility = NDArray[np.bool_]
+from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
 
 FUNCTIONS = 100  # of the field that an image is made of
 ROUGH_FUNCTIONS = 20  # of the one that only says where a point would be in the reference image
@@ -39,10 +36,10 @@ class Warps:
 
     field: SmoothField
     reference: Array
-    kept: NDArray[np.bool_]
+    kept: Mask
     coefficients: Array
     weights: Array
-    inlier: Visibility
+    inlier: Mask
     noise_px: Array
     firmness: float
 
@@ -60,16 +57,16 @@ class Warps:
             out.append(sigma**2 * ((at @ inverse) * at).sum(axis=1))
         return np.array(out)
 
-    def fit(self, W: Array, visible: Visibility) -> "Warps":
+    def fit(self, W: Array, visible: Mask) -> "Warps":
         """Smooth images of more frames W (F, 2, p) px."""
         return fitted(self, W, visible, self.firmness)
 
-    def frames(self, chosen: Array | NDArray[np.int64]) -> "Warps":
+    def frames(self, chosen: Array | Indices) -> "Warps":
         """Some of the images."""
         picked = {name: getattr(self, name)[chosen] for name in ("coefficients", "weights", "inlier", "noise_px")}
         return replace(self, **picked)
 
-    def agrees(self, W: Array, visible: Visibility) -> NDArray[np.bool_]:
+    def agrees(self, W: Array, visible: Mask) -> Mask:
         """Points (p,), kept or not, that usually are where the maps say, within what is known of the place."""
         known = np.isfinite(self.reference[0])
         off = np.linalg.norm(W[:, :, known] - self.images(self.reference[:, known]), axis=1)
@@ -86,9 +83,7 @@ class Warps:
         return B
 
 
-def smooth_warps(
-    W: Array, visible: Visibility, kept: NDArray[np.bool_] | None = None, reference: Array | None = None
-) -> Warps:
+def smooth_warps(W: Array, visible: Mask, kept: Mask | None = None, reference: Array | None = None) -> Warps:
     """Smooth images of W (F, 2, p) px, by visibility (F, p).
 
     From the points kept (p,), all by default; over the reference image (2, p), if it is known already.
@@ -107,7 +102,7 @@ def smooth_warps(
     return fitted(empty, W, visible, firmness)
 
 
-def fitted(warps: Warps, W: Array, visible: Visibility, firmness: float) -> Warps:
+def fitted(warps: Warps, W: Array, visible: Mask, firmness: float) -> Warps:
     """Images W (F, 2, p) px made smooth with the functions of other warps."""
     B = warps.functions()
     pairs = zip(W, visible & warps.kept, strict=True)
@@ -116,7 +111,7 @@ def fitted(warps: Warps, W: Array, visible: Visibility, firmness: float) -> Warp
     return replace(warps, coefficients=coefficients, weights=weights, inlier=inlier, noise_px=noise, firmness=firmness)
 
 
-def reference_image(W: Array, visible: Visibility) -> Array:
+def reference_image(W: Array, visible: Mask) -> Array:
     """One image (2, p) px of all points: the median of what every image, warped on to the fullest one, says.
 
     NaN for points that no image shows.
@@ -137,9 +132,7 @@ def reference_image(W: Array, visible: Visibility) -> Array:
     return median(said)
 
 
-def robust_fit(
-    B: Array, w: Array, seen: NDArray[np.bool_], stiffness: Array, firmness: float
-) -> tuple[Array, Array, NDArray[np.bool_], float]:
+def robust_fit(B: Array, w: Array, seen: Mask, stiffness: Array, firmness: float) -> tuple[Array, Array, Mask, float]:
     """Smooth function through image points w (2, p), Geman-McClure weights, B (p, r) the functions at the points.
 
     Returns:

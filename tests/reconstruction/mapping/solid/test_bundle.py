@@ -2,9 +2,9 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reconstruction.mapping.adjustment import Adjustment, adjust, energy, linearise
-from reconstruction.mapping.bundle import Bundle, Loss, Prior, derivatives, off_plane, scaled
-from reconstruction.mapping.rigid import RigidMotion
+from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.mapping.solid.adjustment import Adjustment, adjust, energy, linearise
+from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior, derivatives, off_plane, scaled
 from tests.reconstruction.world import SEEDS, random_rotation
 
 FREE = Prior(depth=0.0, focal=1.0, kappa=0.2)

@@ -1,7 +1,7 @@
 import numpy as np
 from hypothesis import given, settings
 
-from reconstruction.mapping.views import building_order, completed, likeness
+from reconstruction.mapping.solid.views import building_order, completed, likeness
 from tests.reconstruction.world import SEEDS, spread
 
 

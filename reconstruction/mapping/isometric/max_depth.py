@@ -3,13 +3,11 @@
 import clarabel  # type: ignore[import-untyped]
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from reconstruction.arrays import Array, Indices, Mask
 
 
-def maximum_depth(rays: Array, edges: Indices, seen: NDArray[np.bool_]) -> Array:
+def maximum_depth(rays: Array, edges: Indices, seen: Mask) -> Array:
     """Depths (F, m) along rays (F, 3, m), up to one scale, such that no edge (n, 2) is ever longer than its length.
 
     The lengths d (n,) are unknown and the same in all frames. A second-order cone programme:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import with_missing, with_outliers
-from reconstruction.mapping.solid import bundle_adjust
+from reconstruction.mapping.solid.solid import bundle_adjust
 from tests.reconstruction.world import CAMERAS, ORTHOGRAPHIC, PERSPECTIVE, SEEDS, relief, seen, shape_error, turns
 
 KEYFRAMES, POINTS = 14, 120

@@ -6,18 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError
+from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera
-from reconstruction.mapping.adjustment import Adjustment, adjust
-from reconstruction.mapping.bundle import Bundle, Loss, Prior, off_plane, scaled
+from reconstruction.mapping.evidence import TURN_DEGREES
 from reconstruction.mapping.factorization import view_turn_degrees
-from reconstruction.mapping.outliers import usual, without_outliers
-from reconstruction.mapping.rest_shape import TURN_DEGREES
-from reconstruction.mapping.rigid import RigidMotion
-from reconstruction.mapping.spikes import smoothed
-from reconstruction.mapping.views import building_order, completed, likeness
-
-Array = NDArray[np.float64]
-Visibility = NDArray[np.bool_]
+from reconstruction.mapping.outliers import without_outliers
+from reconstruction.mapping.solid.adjustment import Adjustment, adjust
+from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior, off_plane, scaled
+from reconstruction.mapping.solid.spikes import smoothed
+from reconstruction.mapping.solid.views import building_order, completed, likeness
+from reconstruction.window.robust import deviation
 
 FEWEST_VIEWS, FEWEST_POINTS = 3, 6
 DOME = 0.4  # height of the shape it starts from, over its RMS radius
@@ -55,7 +54,7 @@ class Solid:
     motion: RigidMotion
     camera: Camera
     residual_px: Array
-    trusted: Visibility
+    trusted: Mask
     turn_degrees: float
     relief: float
     bulges: tuple[float, float]
@@ -72,7 +71,7 @@ class Solid:
         return np.asarray(np.nanmedian(self.residual_px, axis=1))
 
 
-def bundle_adjust(W: Array, visible: Visibility, camera: Camera, *, refine_focal: bool = True, flat: bool = False) -> Solid:
+def bundle_adjust(W: Array, visible: Mask, camera: Camera, *, refine_focal: bool = True, flat: bool = False) -> Solid:
     """The rigid shape that explains keyframes best.
 
     Args:
@@ -126,7 +125,7 @@ class Build:
     first: Array
     turn: NDArray[np.complex128]
     scale: Array
-    parent: NDArray[np.int64]
+    parent: Indices
     flat: bool
 
     def run(self, bulge: int, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
@@ -170,7 +169,7 @@ class Build:
         """Adjust with a loss and priors scaled to the present residuals."""
         n = len(bundle.motion.s)
         W, h = self.W[:n], self.h[:n]
-        sigma = usual(np.linalg.norm(bundle.image() - W, axis=1)[h > 0], LEAST_TAIL / TAIL_SIGMAS)
+        sigma = deviation(np.linalg.norm(bundle.image() - W, axis=1)[h > 0], LEAST_TAIL / TAIL_SIGMAS)
         loss = Loss(TAIL_SIGMAS * sigma, redescending)
         prior = prior_of(bundle, h, sigma, kappa, refine=refine)
         prior = replace(prior, depth=FLAT) if self.flat else prior
@@ -210,7 +209,7 @@ def relief(shape: Array) -> float:
     return float(np.sqrt(np.linalg.eigvalsh(np.cov(shape, bias=True))[0].clip(0))) / width(shape)
 
 
-def describe(W: Array, visible: Visibility, bundle: Bundle, camera: Camera, bulges: tuple[float, float]) -> Solid:
+def describe(W: Array, visible: Mask, bundle: Bundle, camera: Camera, bulges: tuple[float, float]) -> Solid:
     """The solid of a bundle in pixels, its spikes smoothed; W and bundle relative to the principal point."""
     residual = np.where(visible, np.linalg.norm(bundle.image() - W, axis=1), np.nan)
     focal = 1 / bundle.kappa if bundle.kappa else np.inf

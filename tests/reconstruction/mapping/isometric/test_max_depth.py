@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from reconstruction.mapping.max_depth import maximum_depth
-from reconstruction.mapping.nodes import neighbours, rays_of
+from reconstruction.mapping.isometric.max_depth import maximum_depth
+from reconstruction.mapping.isometric.nodes import neighbours, rays_of
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 
 

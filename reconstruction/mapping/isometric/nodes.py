@@ -3,16 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reconstruction.arrays import Array, Indices
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.camera import Camera
-from reconstruction.mapping.lengths import Edges, edges_of
-from reconstruction.mapping.smooth_field import SmoothField
-from reconstruction.mapping.warps import Warps
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from reconstruction.mapping.isometric.lengths import Edges, edges_of
+from reconstruction.mapping.isometric.smooth_field import SmoothField
+from reconstruction.mapping.isometric.warps import Warps
 
 NODES = 80
 NEIGHBOURS = 6

@@ -5,12 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.mapping.outliers import medians
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Visibility = NDArray[np.bool_]
 
 COMPARED = 120  # points: enough to tell views apart
 ROUNDS = 4  # of robust weights
@@ -31,7 +28,7 @@ class Likeness:
     distance: Array
 
 
-def likeness(W: Array, visible: Visibility) -> Likeness:
+def likeness(W: Array, visible: Mask) -> Likeness:
     """Compare all pairs of views (K, 2, p); robust against outliers and missing points."""
     place = np.where(visible[:, None], W, 0.0).sum(axis=0) / visible.sum(axis=0).clip(1)
     few = farthest_points(place.T, COMPARED)
@@ -68,7 +65,7 @@ def building_order(alike: Likeness) -> tuple[Indices, Indices]:
     return np.array(order), np.array(parent)
 
 
-def completed(W: Array, visible: Visibility, alike: Likeness, view: int) -> Array:
+def completed(W: Array, visible: Mask, alike: Likeness, view: int) -> Array:
     """All points (2, p) as one view should see them: the middle of where the views like it put them."""
     z = (np.where(visible, W[:, 0] + 1j * W[:, 1], np.nan) - alike.b[view][:, None]) / alike.a[view][:, None]
     beside = np.argsort(alike.distance[view])

@@ -3,15 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reconstruction.arrays import Array
 from reconstruction.evaluation import e3d
-from reconstruction.mapping.isometric import SOLVER, adjust, again
-from reconstruction.mapping.isometric_sheet import IsometricSheet
-from reconstruction.mapping.lengths import mean_log_lengths
-from reconstruction.mapping.nodes import edges_between
-
-Array = NDArray[np.float64]
+from reconstruction.mapping.isometric.adjustment import SOLVER, adjust, again
+from reconstruction.mapping.isometric.lengths import mean_log_lengths
+from reconstruction.mapping.isometric.nodes import edges_between
+from reconstruction.mapping.isometric.sheet import IsometricSheet
 
 FACTORS = (0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8)  # of the focal length that are tried first
 CLOSER = (0.93, 1.0, 1.08)

@@ -4,10 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from reconstruction.arrays import Array, Indices
 
 HOPELESS = 1e4  # damping with which no step helps
 

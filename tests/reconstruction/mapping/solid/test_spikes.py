@@ -1,8 +1,8 @@
 import numpy as np
 
 from reconstruction.evaluation import with_outliers
-from reconstruction.mapping.solid import bundle_adjust
-from reconstruction.mapping.spikes import off_neighbours_plane, worst_spike
+from reconstruction.mapping.solid.solid import bundle_adjust
+from reconstruction.mapping.solid.spikes import off_neighbours_plane, worst_spike
 from tests.reconstruction.world import PERSPECTIVE, relief, seen, shape_error, spread, turns
 
 

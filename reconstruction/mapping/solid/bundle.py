@@ -11,12 +11,10 @@ Derivatives: ∂u/∂Y = [1, 0, −κu_x; 0, 1, −κu_y]/d, ∂u/∂t = 1/d, �
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reconstruction.arrays import Array, Indices
+from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import quaternion_exp, rotation_from_quaternion
-from reconstruction.mapping.rigid import RigidMotion
-
-Array = NDArray[np.float64]
 
 POSE = 6  # θ, t, log s of a view
 
@@ -50,7 +48,7 @@ class Bundle:
         motion = RigidMotion(m.shape + points, R, m.s * np.exp(poses[:, 5]), m.t + poses[:, 3:5])
         return Bundle(motion, self.kappa * float(np.exp(log_kappa)))
 
-    def __getitem__(self, views: NDArray[np.int64]) -> "Bundle":
+    def __getitem__(self, views: Indices) -> "Bundle":
         m = self.motion
         return Bundle(RigidMotion(m.shape, m.R[views], m.s[views], m.t[views]), self.kappa)
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from reconstruction.mapping.smooth_field import smooth_field
-from reconstruction.mapping.warps import median, reference_image, smooth_warps
+from reconstruction.mapping.isometric.smooth_field import smooth_field
+from reconstruction.mapping.isometric.warps import median, reference_image, smooth_warps
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 
 

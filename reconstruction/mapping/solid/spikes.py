@@ -9,18 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
+from reconstruction.arrays import Array, Mask
 from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modes import principal_axes
-from reconstruction.mapping.bundle import Bundle, derivatives
-from reconstruction.mapping.outliers import usual
-from reconstruction.mapping.rigid import RigidMotion
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Visibility = NDArray[np.bool_]
+from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.mapping.solid.bundle import Bundle, derivatives
+from reconstruction.window.robust import deviation
 
 INLIER_SIGMAS = 3.0  # of the residuals
 LIKE_VIEWS = 4.0  # views whose errors are alike, since what deforms stays so for a while: they count as one
@@ -35,7 +31,7 @@ PROVEN = 20.0  # standard deviations of its depth that it may, too: a nose of fe
 SMOOTHEST = 0.1  # times the same: no surface is believed to be smoother, or creases would be rounded
 
 
-def smoothed(W: Array, visible: Visibility, bundle: Bundle, residual: Array) -> tuple[RigidMotion, Visibility]:
+def smoothed(W: Array, visible: Mask, bundle: Bundle, residual: Array) -> tuple[RigidMotion, Mask]:
     """The motion with spikes smoothed, and which points (p,) keep the depth that the views gave them.
 
     Args:
@@ -47,7 +43,7 @@ def smoothed(W: Array, visible: Visibility, bundle: Bundle, residual: Array) -> 
     axes = principal_axes(bundle.motion.shape)
     shape = axes.T @ bundle.motion.shape
     deep = float(np.sqrt(np.var(shape[:2], axis=1).mean())) / 2
-    sigma = usual(residual[visible], LEAST_SIGMA * deep)
+    sigma = deviation(residual[visible], LEAST_SIGMA * deep)
     agrees = visible & (np.nan_to_num(residual, nan=np.inf) < INLIER_SIGMAS * 1.2 * sigma)
     count = agrees.sum(axis=0)
     sound = (count >= FEWEST) & (count >= SHARE * visible.sum(axis=0))
@@ -56,7 +52,7 @@ def smoothed(W: Array, visible: Visibility, bundle: Bundle, residual: Array) -> 
     noise = np.sqrt((own**2 + sigma**2) / 2)
     spread = np.minimum(depth_variance(information) * noise**2 * LIKE_VIEWS, deep**2)
 
-    def spike(off: Array) -> Visibility:
+    def spike(off: Array) -> Mask:
         return np.asarray((np.abs(off) > LARGEST * deep) & (np.abs(off) < PROVEN * np.sqrt(spread)))
 
     for _ in range(ROUNDS):
@@ -95,7 +91,7 @@ def along(information: Array, change: Array) -> Array:
     return np.concatenate([beside, change[None]])
 
 
-def off_neighbours_plane(points: Array, sound: Visibility) -> tuple[sp.csr_array, Array]:
+def off_neighbours_plane(points: Array, sound: Mask) -> tuple[sp.csr_array, Array]:
     """D (p, p), so that D z are distances from the planes through the neighbours, and the neighbours' mean distance (p,).
 
     Neighbours of points (2, p) are those of the Delaunay mesh and theirs. Points that are not sound (p,) hardly count as

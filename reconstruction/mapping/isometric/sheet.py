@@ -3,15 +3,13 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
-from reconstruction.mapping.lengths import best_start
-from reconstruction.mapping.nodes import Nodes, edges_between, nearest, nodes_in, rays_of
-from reconstruction.mapping.smooth_field import SmoothField
-from reconstruction.mapping.warps import Warps
-
-Array = NDArray[np.float64]
+from reconstruction.mapping.isometric.lengths import best_start
+from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_in, rays_of
+from reconstruction.mapping.isometric.smooth_field import SmoothField
+from reconstruction.mapping.isometric.warps import Warps
 
 BROKEN = 0.3  # weight of an edge that does not keep its length
 
@@ -56,7 +54,7 @@ class IsometricSheet:
         S[:, :, known] = depth[:, None] * rays_of(self.warps.images(points), self.camera)
         return S
 
-    def finish(self, W: Array, visible: NDArray[np.bool_], steps: int = 6) -> "IsometricSheet":
+    def finish(self, W: Array, visible: Mask, steps: int = 6) -> "IsometricSheet":
         """The sheet in other frames W (F, 2, p) px, each by itself, its lengths known.
 
         Each starts from the two keyframes that look most alike; the better end is kept.
@@ -73,7 +71,7 @@ class IsometricSheet:
         strain = edges.rms(edges.log_lengths(c) - self.log_lengths)
         return replace(self, warps=warps, nodes=nodes, coefficients=c, strain=strain)
 
-    def strays(self) -> NDArray[np.bool_]:
+    def strays(self) -> Mask:
         """Points (p,) that are not on the sheet: nearest to a node most of whose edges do not keep their length."""
         count = np.bincount(self.nodes.ends.ravel(), minlength=self.nodes.reference.shape[1])
         broken = np.bincount(self.nodes.ends[self.edge_weights < BROKEN].ravel(), minlength=len(count))

@@ -9,9 +9,9 @@ import pytest
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
-from reconstruction.mapping.isometric import sheet
-from reconstruction.mapping.isometric_sheet import IsometricSheet
-from reconstruction.mapping.sheet_evidence import focal, halves_disagreement
+from reconstruction.mapping.isometric.adjustment import sheet
+from reconstruction.mapping.isometric.focal import focal, halves_disagreement
+from reconstruction.mapping.isometric.sheet import IsometricSheet
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 
 SEEN = np.ones((12, 150), bool)

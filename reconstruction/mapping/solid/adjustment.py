@@ -6,11 +6,9 @@ Points are eliminated (Schur complement): a step is one matrix product over the 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from reconstruction.mapping.bundle import POSE, Bundle, Loss, Prior, derivatives, off_plane
-
-Array = NDArray[np.float64]
+from reconstruction.arrays import Array
+from reconstruction.mapping.solid.bundle import POSE, Bundle, Loss, Prior, derivatives, off_plane
 
 NEAREST = 0.1  # a point's depth over its view's, closer than which no point may come to the camera
 GIVING_UP = 1e6  # damping at which no step helps any more

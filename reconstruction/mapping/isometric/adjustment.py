@@ -5,18 +5,23 @@ same in all keyframes. It needs a perspective camera; see `focal` in `sheet_evid
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reconstruction import ReconstructionError
+from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
-from reconstruction.mapping.isometric_sheet import IsometricSheet
-from reconstruction.mapping.lengths import Edges, Solver, adjust_depths, best_start, mean_log_lengths, robust_lengths
-from reconstruction.mapping.max_depth import maximum_depth
-from reconstruction.mapping.nodes import NEIGHBOURS, Nodes, edges_between, nearest, neighbours, nodes_of, rays_of
-from reconstruction.mapping.smooth_field import SmoothField, smooth_field
-from reconstruction.mapping.warps import Warps, smooth_warps
-
-Array = NDArray[np.float64]
+from reconstruction.mapping.isometric.lengths import (
+    Edges,
+    Solver,
+    adjust_depths,
+    best_start,
+    mean_log_lengths,
+    robust_lengths,
+)
+from reconstruction.mapping.isometric.max_depth import maximum_depth
+from reconstruction.mapping.isometric.nodes import NEIGHBOURS, Nodes, edges_between, nearest, neighbours, nodes_of, rays_of
+from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
+from reconstruction.mapping.isometric.warps import Warps, smooth_warps
 
 FUNCTIONS = 40
 START_NODES, START_FRAMES = 60, 15  # of the convex start
@@ -31,7 +36,7 @@ LOOKS = 3
 SOLVER = Solver()
 
 
-def sheet(W: Array, visible: NDArray[np.bool_], camera: Camera) -> IsometricSheet:
+def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
     """The sheet that points W (F, 2, p) px with visibility (F, p) lie on, keyframes most different first.
 
     Points of something else, at the sheet's border mostly, show by distances that change, and are left out.
