@@ -23,5 +23,5 @@ def demo(config: Demo, progress: Progress) -> RunSummary:
         output=Output(out=path, overwrite=True, view=config.view, json=config.json),
     )
     if path.exists():
-        progress.say(f"replacing {path}")
+        progress.log(f"replacing {path}")
     return Session(run, progress).run()
