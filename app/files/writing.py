@@ -56,7 +56,7 @@ def moved_when_complete(path: Path) -> Iterator[Path]:
     Raises:
         UsageError: the file cannot be written.
     """
-    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    part = path.with_name(f".{path.stem}.part{path.suffix}")  # hidden: *.rrd means finished ones
     try:
         yield part
         part.replace(path)
