@@ -27,7 +27,7 @@ class Logged(Progress):
     def __enter__(self) -> "Logged":
         return self
 
-    def say(self, text: str) -> None:
+    def log(self, text: str) -> None:
         """A line."""
         LOG.info(text)
 

@@ -14,7 +14,7 @@ import numpy as np
 from tracking import Image, TrackingError
 from tracking.images import ImageFiles
 
-Say = Callable[[str], None]
+Log = Callable[[str], None]
 
 PATIENCE_S = 60.0  # a broken stream is waited for
 RETRY_S = 0.5  # between two attempts
@@ -37,11 +37,11 @@ class Reconnecting:
         url: its address.
         capture: the stream, open.
         closing: set when nobody wants it any more.
-        say: told in words when it breaks and resumes; called in the thread that grabs.
+        log: told in words when it breaks and resumes; called in the thread that grabs.
     """
 
-    def __init__(self, url: str, capture: Capture, closing: threading.Event, say: Say) -> None:
-        self._url, self._capture, self._closing, self._say = url, capture, closing, say
+    def __init__(self, url: str, capture: Capture, closing: threading.Event, log: Log) -> None:
+        self._url, self._capture, self._closing, self._log = url, capture, closing, log
         self._began = False
 
     def grab(self) -> bool:
@@ -52,15 +52,15 @@ class Reconnecting:
         if not self._began or self._closing.is_set():
             return False
         broken = monotonic()
-        self._say(f"{self._url} broke: connecting again")
+        self._log(f"{self._url} broke: connecting again")
         while not self._closing.wait(RETRY_S) and monotonic() - broken < PATIENCE_S:
             self._capture.release()
             self._capture = open_url(self._url)
             if self._capture.grab():
-                self._say(f"{self._url} resumed after {monotonic() - broken:.1f} s")
+                self._log(f"{self._url} resumed after {monotonic() - broken:.1f} s")
                 return True
         if not self._closing.is_set():
-            self._say(f"{self._url} did not come back in {PATIENCE_S:.0f} s: ending")
+            self._log(f"{self._url} did not come back in {PATIENCE_S:.0f} s: ending")
         return False
 
     def retrieve(self) -> tuple[bool, Image]:
@@ -76,8 +76,8 @@ class Reconnecting:
         self._capture.release()
 
 
-def open_capture(source: str, closing: threading.Event, say: Say) -> Capture:
-    """Open a source; `closing` and `say` as for `Reconnecting`.
+def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
+    """Open a source; `closing` and `log` as for `Reconnecting`.
 
     Raises:
         TrackingError: it is missing or cannot be decoded.
@@ -91,7 +91,7 @@ def open_capture(source: str, closing: threading.Event, say: Say) -> Capture:
         capture = open_url(source)
         if not cast(cv2.VideoCapture, capture).isOpened():
             raise TrackingError(f"{source} cannot be decoded; check the address")
-        return capture if announced_frames(capture) else Reconnecting(source, capture, closing, say)
+        return capture if announced_frames(capture) else Reconnecting(source, capture, closing, log)
     path = Path(source)
     if re.search(r"%0?\d*d", source) and not path.exists():
         return ImageFiles(source)

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from tracking import Image, TrackingError
-from tracking.capture import Reconnecting, Say, announced_frames, as_bgr, is_camera, open_capture
+from tracking.capture import Log, Reconnecting, announced_frames, as_bgr, is_camera, open_capture
 
 DEFAULT_FPS = 30.0  # of sources that do not tell
 DECODE_AHEAD = 4  # frames waiting in the queue: enough to hide decoding, little memory
@@ -48,7 +48,7 @@ class Video:
         stop: index of the first frame not delivered any more; None reads to the end.
         duration_s: so long after the first frame the video ends; None for no limit.
         drop_late: of a live source, deliver always the newest frame and drop those nobody had time for.
-        say: told in words when a stream breaks and resumes; called in another thread.
+        log: told in words when a stream breaks and resumes; called in another thread.
 
     Attributes:
         live: whether frames come when they happen: a camera, or a stream without end. Their time stamps are
@@ -70,7 +70,7 @@ class Video:
         *,
         duration_s: float | None = None,
         drop_late: bool = False,
-        say: Say = lambda _: None,
+        log: Log = lambda _: None,
     ) -> None:
         if first < 0 or (stop is not None and stop <= first):
             raise TrackingError(
@@ -79,7 +79,7 @@ class Video:
         self.source = source
         self._stop, self._duration_s = stop, duration_s
         self._closing = threading.Event()
-        self._capture = open_capture(source, self._closing, say)
+        self._capture = open_capture(source, self._closing, log)
         self.live = is_camera(source) or isinstance(self._capture, Reconnecting)
         if drop_late and not self.live:
             self._capture.release()

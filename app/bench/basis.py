@@ -10,7 +10,7 @@ from scipy.linalg import eigh, subspace_angles
 from threadpoolctl import threadpool_limits
 
 from app.bench.own_process import apart
-from app.bench.timing import Say
+from app.bench.timing import Log
 from app.rivals.modal_analysis import vibration_modes
 from app.rivals.problems import MODES, surface_with_mesh
 from reconstruction.basis import distances, landmarks
@@ -45,13 +45,13 @@ class BasisTime:
     """As many modes of an elastic shell; None where not tried."""
 
 
-def basis_times(*, quick: bool, say: Say) -> Iterator[BasisTime]:
+def basis_times(*, quick: bool, log: Log) -> Iterator[BasisTime]:
     """Every size and metric."""
     for points in QUICK_POINTS if quick else POINTS:
-        say(f"basis, {points} points")
+        log(f"basis, {points} points")
         modal_s = None
         if points <= MOST_FOR_MODAL_QUICK or not quick:
-            say(f"modal analysis, {points} points")
+            log(f"modal analysis, {points} points")
             modal_s = modal_analysis_s(points)
         for metric in METRICS:
             (build_s, eigenpairs_s), peak_mb = apart(own_times, points, metric)
@@ -96,9 +96,9 @@ def clocked(work: Callable[[], T]) -> tuple[T, float]:
     return result, least
 
 
-def angle_degrees(metric: Metric, say: Say) -> float:
+def angle_degrees(metric: Metric, log: Log) -> float:
     """Largest angle between the leading modes that landmarks give and the exact ones."""
-    say(f"landmarks against exact modes, {metric}")
+    log(f"landmarks against exact modes, {metric}")
     rest, mesh = surface_with_mesh(COMPARED_POINTS)
     exact = leading_eigenpairs(doubly_centred(distances.dissimilarity(metric, rest, mesh.edges)), COMPARED_MODES)[1]
     near = landmarks.leading_eigenpairs(rest, mesh.edges, COMPARED_MODES, metric)[1]

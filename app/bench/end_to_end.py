@@ -13,7 +13,7 @@ from time import perf_counter, time
 import numpy as np
 
 from app.bench.own_process import apart
-from app.bench.timing import Say
+from app.bench.timing import Log
 
 ROOT = Path(__file__).parents[2]
 KINECT = ROOT.parent / "shared" / "data" / "kinect_paper.mp4"  # research data, not part of the program
@@ -47,18 +47,18 @@ class WholeRun:
     """Longest time between two frames after which the file of the recording had grown."""
 
 
-def whole_runs(*, quick: bool, say: Say) -> Iterator[WholeRun]:
+def whole_runs(*, quick: bool, log: Log) -> Iterator[WholeRun]:
     """Of the sample and, where it is at hand, of the Kinect's paper."""
     from app.demo import sample
 
-    say("rendering the sample video")
+    log("rendering the sample video")
     made = sample()
     videos = [("demo", made.video, made.roi)]
     if KINECT.exists():
         videos = [("kinect_paper", KINECT, KINECT_ROI), *videos]
     for name, video, roi in videos[: 1 if quick else None]:
         for points in POINTS[: 1 if quick else None]:
-            say(f"run of {name}, {points} points")
+            log(f"run of {name}, {points} points")
             yield whole_run(name, video, roi, points, QUICK_FRAMES if quick else None)
 
 
@@ -83,9 +83,9 @@ def whole_run(name: str, video: Path, roi: tuple[int, int, int, int], points: in
     )
 
 
-def many_points(say: Say) -> tuple[int, float]:
+def many_points(log: Log) -> tuple[int, float]:
     """Points and peak memory in MB of `evaluate` on as many points as the paper's largest model, for a few frames."""
-    say(f"evaluate with {MANY_POINTS} points")
+    log(f"evaluate with {MANY_POINTS} points")
     return apart(evaluate_many)
 
 
@@ -124,9 +124,9 @@ def run_apart(video: Path, roi: tuple[int, int, int, int], points: int, frames: 
         return child("app.bench.timed_run", *arguments) | {"started": started}
 
 
-def help_s(say: Say) -> float:
+def help_s(log: Log) -> float:
     """Seconds of `modeshape --help`, the least of several."""
-    say("modeshape --help")
+    log("modeshape --help")
     least = np.inf
     for _ in range(HELP_REPEATS):
         started = perf_counter()

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 
 from app.arrays import Image
-from app.bench.timing import Say, least_s
+from app.bench.timing import Log, least_s
 from app.painting.compositing import Compositor
 from app.painting.picture import premultiplied
 from reconstruction.basis.mesh import triangulate
@@ -16,9 +16,9 @@ PICTURE = (900, 1200, 3)
 BUDGET_S = 1.5
 
 
-def paint_ms(say: Say) -> float:
+def paint_ms(log: Log) -> float:
     """Milliseconds of one core for a frame: colours, light and occlusion mask."""
-    say("painting a picture")
+    log("painting a picture")
     rng = np.random.default_rng(0)
     (left, right), (top, bottom) = COLUMNS_PX, ROWS_PX
     grid = np.meshgrid(np.linspace(left, right, GRID[0]), np.linspace(top, bottom, GRID[1]))

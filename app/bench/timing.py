@@ -6,7 +6,7 @@ from time import perf_counter, process_time
 
 MOST_REPEATS = 30
 
-Say = Callable[[str], None]
+Log = Callable[[str], None]
 
 
 def least_s(*jobs: Callable[[], object], budget_s: float = 0.3) -> list[float]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.bench.timing import Say, growth, least_s
+from app.bench.timing import Log, growth, least_s
 from app.rivals.problems import WindowStep, full_model, summed, window_step
 from app.terminal.errors import UsageError
 from reconstruction.window.marginal import Previous
@@ -55,15 +55,15 @@ class Race:
     """None: pyceres is not installed."""
 
 
-def timings(*, quick: bool, say: Say) -> list[Timing]:
+def timings(*, quick: bool, log: Log) -> list[Timing]:
     """Every size."""
     steps: list[tuple[WindowStep, str]] = []
     for points in QUICK_POINTS if quick else POINTS:
-        say(f"window step, {points} points")
+        log(f"window step, {points} points")
         model = full_model(points)
         for modes in QUICK_MODES if quick else MODES:
             steps += [(window_step(model, modes, deformation), deformation) for deformation in DEFORMATIONS[quick:]]
-    say("one iteration")
+    log("one iteration")
     iteration_s = {}
     for kind in {(step.modes, deformation) for step, deformation in steps}:
         alike = [step for step, deformation in steps if (step.modes, deformation) == kind]
@@ -106,13 +106,13 @@ def solved(step: WindowStep, solver: Solver) -> Solution:
     return minimise(step.energy, data, step.start, Previous(step.before), solver)
 
 
-def races(*, quick: bool, say: Say) -> Iterator[Race]:
+def races(*, quick: bool, log: Log) -> Iterator[Race]:
     """Against SciPy and Ceres."""
     for points in (828,) if quick else RIVAL_POINTS:
         model = full_model(points)
         for modes in QUICK_MODES if quick else MODES:
             for deformation in DEFORMATIONS[quick:]:
-                say(f"SciPy and Ceres, {points} points, {modes} modes, {deformation}")
+                log(f"SciPy and Ceres, {points} points, {modes} modes, {deformation}")
                 yield race(window_step(model, modes, deformation), deformation)
 
 

@@ -1,4 +1,4 @@
-"""`modeshape batch`: many videos, here or on a cluster; failures are told, and cost only themselves."""
+"""`modeshape batch`: many videos, on this machine or a cluster; one that fails does not stop the others."""
 
 import csv
 import hashlib
@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.commands.batch_job import UNFINISHED, Job, carry_out
+from app.files.names import stem
 from app.files.writing import writable
 from app.options.batch import Batch
 from app.terminal.errors import UsageError
@@ -56,7 +57,7 @@ class Outcome(Summary):
 
 
 def batch(command: Batch, progress: Progress) -> Outcome:
-    """Run what is not done yet, and tell about all.
+    """Run the videos that are not done yet, and list all.
 
     Raises:
         UsageError: the folder cannot be written, or there is no such scheduler.
@@ -72,20 +73,20 @@ def batch(command: Batch, progress: Progress) -> Outcome:
     with progress:
         progress.expect(len(waiting))
         try:
-            ended = on_cluster(waiting, command.scheduler) if command.scheduler else here(waiting, command.jobs)
+            ended = on_cluster(waiting, command.scheduler) if command.scheduler else on_this_machine(waiting, command.jobs)
             for job, words in ended:
                 results[job.video] = words
                 progress.advance(job.name)
                 if "error" in words:
-                    progress.say(f"{job.video}: {words['error']}")
+                    progress.log(f"{job.video}: {words['error']}")
         except KeyboardInterrupt:
             interrupted = True
-    told = [{"name": job.name} | results.get(job.video, {"source": job.video, "error": "interrupted"}) for job in jobs]
-    failed = [words for words in told if "error" in words]
+    listed = [{"name": job.name} | results.get(job.video, {"source": job.video, "error": "interrupted"}) for job in jobs]
+    failed = [words for words in listed if "error" in words]
     if waiting:
-        write_csv(command.out / "summary.csv", told)
+        write_csv(command.out / "summary.csv", listed)
     tidy(command.out / UNFINISHED)
-    return Outcome(told, skipped, len(failed), interrupted)
+    return Outcome(listed, skipped, len(failed), interrupted)
 
 
 def make_jobs(command: Batch) -> list[Job]:
@@ -105,16 +106,16 @@ def make_jobs(command: Batch) -> list[Job]:
     cores = 0 if command.scheduler else max(1, (os.cpu_count() or 1) // at_a_time)
     found = []
     for video in videos:
-        stem = Path(video.split("?")[0]).stem.replace("%", "") or "video"
+        name = stem(video)
         digest = hashlib.sha256(video.encode()).hexdigest()[:8]
-        job = Job(video, stem, folder, tuple(shlex.split(command.options)), cores)
+        job = Job(video, name, folder, tuple(shlex.split(command.options)), cores)
         if stems[Path(video).stem] > 1 or (job.report.exists() and job.done() is None):
-            job = Job(video, f"{stem}-{digest}", folder, job.options, cores)
+            job = Job(video, f"{name}-{digest}", folder, job.options, cores)
         found.append(job)
     return found
 
 
-def here(jobs: list[Job], at_a_time: int | None) -> Iterator[tuple[Job, dict[str, object]]]:
+def on_this_machine(jobs: list[Job], at_a_time: int | None) -> Iterator[tuple[Job, dict[str, object]]]:
     """Carry jobs out on this machine, so many at a time; an interrupt ends them all."""
     processes: list[subprocess.Popen[str]] = []
     stopping = threading.Event()
@@ -162,12 +163,12 @@ def on_cluster(jobs: list[Job], scheduler: str) -> Iterator[tuple[Job, dict[str,
             yield job, {"source": job.video, "error": str(failure)} if failure else future.result()
 
 
-def write_csv(path: Path, told: list[dict[str, object]]) -> None:
-    """The same as a file."""
+def write_csv(path: Path, videos: list[dict[str, object]]) -> None:
+    """A table of all videos, a row for each."""
     with writable(path) as file, io.TextIOWrapper(file, "utf-8", newline="") as text:
         rows = csv.DictWriter(text, ("name", "source", *COLUMNS, "recording", "error"), extrasaction="ignore")
         rows.writeheader()
-        rows.writerows(told)
+        rows.writerows(videos)
 
 
 def tidy(folder: Path) -> None:

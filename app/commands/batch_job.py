@@ -1,4 +1,4 @@
-"""One video of a batch, in a process of its own: whatever happens to it, the others go on."""
+"""One video of a batch, in a process of its own."""
 
 import json
 import os
@@ -34,12 +34,12 @@ class Job:
 
     @property
     def recording(self) -> Path:
-        """When it is done."""
+        """The recording, once it is done."""
         return self.folder / f"{self.name}.rrd"
 
     @property
     def report(self) -> Path:
-        """Its summary, or what went wrong."""
+        """The file with its summary, or with what went wrong."""
         return self.folder / f"{self.name}.json"
 
     def done(self) -> dict[str, object] | None:

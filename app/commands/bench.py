@@ -56,18 +56,18 @@ def bench(command: Bench, progress: Progress) -> Benchmarks:
     check_free(command.plot, overwrite=command.overwrite)
     if command.readme:
         with_table(command.readme, README_TABLE, "")
-    quick, say = command.quick, progress.say
+    quick, log = command.quick, progress.log
     with progress, threadpool_limits(1):  # as in a run
-        races = list(window.races(quick=quick, say=say))
+        races = list(window.races(quick=quick, log=log))
         if races[0].ceres_ms is None:
-            say("pyceres is not installed, so Ceres takes no part: pip install 'modeshape[bench]'")
-        timings = window.timings(quick=quick, say=say)
-        basis_times = list(basis.basis_times(quick=quick, say=say))
-        angles = {metric: basis.angle_degrees(metric, say) for metric in basis.METRICS}
-        runs = list(end_to_end.whole_runs(quick=quick, say=say))
-        help_s = end_to_end.help_s(say)
-        paint_ms = painting.paint_ms(say)
-        many = None if quick else end_to_end.many_points(say)
+            log("pyceres is not installed, so Ceres takes no part: pip install 'modeshape[bench]'")
+        timings = window.timings(quick=quick, log=log)
+        basis_times = list(basis.basis_times(quick=quick, log=log))
+        angles = {metric: basis.angle_degrees(metric, log) for metric in basis.METRICS}
+        runs = list(end_to_end.whole_runs(quick=quick, log=log))
+        help_s = end_to_end.help_s(log)
+        paint_ms = painting.paint_ms(log)
+        many = None if quick else end_to_end.many_points(log)
     ratios = window.ratios(timings, races) | basis.ratios(basis_times, angles)
     ratios |= end_to_end.ratios(runs, help_s, many) | {"paint_ms": paint_ms}
     if command.plot:

@@ -15,14 +15,13 @@ import tyro
 
 from app.options.batch import Batch
 from app.options.bench import Bench
-from app.options.demo import Demo
 from app.options.evaluate import Evaluate
 from app.options.export import Export
 from app.options.modes import Modes
 from app.options.reproduce import Reproduce
 from app.options.retexture import Retexture
 from app.options.review import Review
-from app.options.run import Run
+from app.options.run import Demo, Run
 from app.recording.environment import environment
 from app.terminal.errors import UsageError, in_a_line
 from app.terminal.exit_code import ExitCode

@@ -4,8 +4,7 @@ from pathlib import Path
 
 from app.demo import sample
 from app.files.names import RECORDINGS
-from app.options.demo import Demo
-from app.options.run import Output, Run
+from app.options.run import Demo, Output, Run
 from app.pipeline.session import Session
 from app.pipeline.summary import RunSummary
 from app.terminal.progress import Progress
@@ -23,5 +22,5 @@ def demo(config: Demo, progress: Progress) -> RunSummary:
         output=Output(out=path, overwrite=True, view=config.view, json=config.json),
     )
     if path.exists():
-        progress.say(f"replacing {path}")
+        progress.log(f"replacing {path}")
     return Session(run, progress).run()

@@ -8,7 +8,7 @@ from typing import Literal
 import cv2
 import numpy as np
 
-from app.arrays import Array, Indices
+from app.arrays import Array
 from app.files.writing import check_free, check_free_folder, writable, writable_folder
 from app.options.export import Export
 from app.playback.playback import Playback
@@ -59,7 +59,7 @@ def export(command: Export, progress: Progress) -> Exported:
         check_free_folder(out, overwrite=command.overwrite)
     playback = Playback.load(command.recording)
     for note in playback.notes:
-        progress.say(note)
+        progress.log(note)
     _ = playback.model  # a UsageError if there is none
     if not playback.shaped.any():
         raise UsageError(f"{playback.path} contains no shape: run again for longer")
@@ -148,7 +148,7 @@ def write_meshes(playback: Playback, folder: Path, command: Export, advance: Cal
 
 def write_video(playback: Playback, out: Path, advance: Callable[[], None]) -> None:
     """The pictures with mesh, points and reprojections drawn over them, at the video's pace."""
-    from app.files.video_out import writable_video
+    from app.files.video_out import steady, writable_video
     from app.playback.overlay import enlarged, overlaid
 
     fps, shown = steady(playback.times_s)
@@ -159,16 +159,6 @@ def write_video(playback: Playback, out: Path, advance: Callable[[], None]) -> N
             advance()
 
 
-def steady(times_s: Array) -> tuple[float, Indices]:
-    """Frames per second of a video, and how many times each frame (F,) is shown so that it keeps its time there."""
-    steps = np.diff(times_s)
-    if not (steps > 0).any():
-        return 25.0, np.ones(len(times_s), np.int64)
-    fps = float(1 / np.median(steps[steps > 0]))
-    ticks = np.round((times_s - times_s[0]) * fps).astype(np.int64)
-    return fps, np.diff(ticks, append=ticks[-1] + 1).clip(0)
-
-
 def held(values: Array) -> Array:
     """Rows (F, …) with those that are NaN replaced by the last one before that is not, at the start by the first one."""
     known = np.isfinite(values.reshape(len(values), -1)).all(axis=1)
@@ -177,19 +167,19 @@ def held(values: Array) -> Array:
 
 
 def texture_coordinates(playback: Playback) -> Array:
-    """Of the vertices (p, 2) in the texture, 0 … 1 from its top left corner; pixel centres are at halves."""
+    """Texture coordinates (p, 2) of the vertices, 0 … 1 from the top left corner; pixel centres are at halves."""
     height, width = playback.texture_bgr.shape[:2]
     return np.asarray((playback.texture_px - playback.texture_origin + 0.5) / (width, height))
 
 
 def default_path(recording: Path, kind: str) -> Path:
-    """Beside the recording; a video gets a name of its own, so as not to be that of its source."""
+    """A path beside the recording; that of a video differs from its source's name."""
     if kind in FOLDERS:
         return recording.with_name(f"{recording.stem}_{kind}")
     return recording.with_name(f"{recording.stem}{'-overlay' if kind in VIDEOS else ''}.{kind}")
 
 
 def megabytes(path: Path) -> float:
-    """Of a file, or of all files in a folder."""
+    """Size of a file, or of all files in a folder."""
     files = [path] if path.is_file() else list(path.iterdir())
     return round(sum([file.stat().st_size for file in files]) / 1e6, 3)

@@ -68,7 +68,7 @@ def of_recording(command: Modes, progress: Progress) -> tuple[str, ModalBasis, M
 
     playback = Playback.load(command.source)
     for note in playback.notes:
-        progress.say(note)
+        progress.log(note)
     asked = cast(MetricChoice, playback.configuration.get("metric", "euclidean"))
     return playback.name, playback.basis, playback.mesh, fitting(asked, flat=is_flat(playback.basis.rest))
 
@@ -89,6 +89,6 @@ def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh
     else:
         reconstruction.finish()
     assert reconstruction.rest is not None
-    progress.say(reconstruction.rest.note)
+    progress.log(reconstruction.rest.note)
     assert reconstruction.metric is not None
     return Path(command.source).stem, reconstruction.model.basis, reconstruction.model.mesh, reconstruction.metric

@@ -71,7 +71,7 @@ def reproduce(command: Reproduce, _: Progress) -> Reproduced:
         Work(command.data, Path(scratch), effort, expected_s) as work,
     ):
         for name, absent in skipped.items():
-            work.say(f"{name}: skipped, {command.data} has no {', '.join(absent)}")
+            work.log(f"{name}: skipped, {command.data} has no {', '.join(absent)}")
         try:
             for experiment in ready:
                 run_one(experiment, work, report)
@@ -89,7 +89,7 @@ def run_one(experiment: Experiment, work: Work, report: Report) -> None:
         result = experiment.run(work)
     seconds = perf_counter() - started
     report.add(experiment, result, seconds, quick=work.effort.quick)
-    work.say(f"{experiment.name}: {seconds:.0f} s")
+    work.log(f"{experiment.name}: {seconds:.0f} s")
 
 
 def needed(experiments: list[Experiment]) -> list[str]:

@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 
 from app.arrays import Image
-from app.commands.export import steady
-from app.files.video_out import check_video_format
+from app.files.video_out import check_video_format, steady
 from app.files.writing import check_free
 from app.options.retexture import Retexture
 from app.options.run import parse_range
@@ -84,7 +83,7 @@ def retexture(command: Retexture, progress: Progress) -> Painted:
 
 
 def follow(command: Retexture, painter: Painter, progress: Progress) -> RunSummary:
-    """Let a painter see a video while it is tracked.
+    """Paint the frames of a video while it is tracked.
 
     Raises:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
@@ -105,7 +104,7 @@ def follow(command: Retexture, painter: Painter, progress: Progress) -> RunSumma
 
 
 def play(command: Retexture, painter: Painter, progress: Progress) -> Played:
-    """Let a painter see a recording.
+    """Paint the frames of a recording.
 
     Raises:
         UsageError: it cannot be read, has no model or no pictures, or an option does not go with it.
@@ -116,7 +115,7 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Played:
     playback = Playback.load(Path(command.source))
     model = playback.model
     for note in playback.notes:
-        progress.say(note)
+        progress.log(note)
     first, stop = parse_range(command.frames)
     wanted = (playback.frames >= first) & (playback.frames < (stop or np.inf))
     if not wanted.any():
@@ -155,7 +154,7 @@ def first_frame(playback: Playback, i: int, image: Image) -> Image:
     `run --texture` has painted that, it has to be the recording's first `image`, of row i.
 
     Raises:
-        UsageError: there it is not.
+        UsageError: the surface is elsewhere in that image.
     """
     if playback.configuration.get("texture") is None:
         (width, height), (x, y), (h, w) = playback.size, playback.texture_origin.tolist(), playback.texture_bgr.shape[:2]

@@ -68,7 +68,7 @@ def review(command: Review, progress: Progress) -> Comparison:
     playbacks = [Playback.load(path) for path in (command.recording, command.other) if path is not None]
     for playback in playbacks:
         for note in playback.notes:
-            progress.say(note)
+            progress.log(note)
     both = reviewed(playbacks)
     if command.csv:
         write_csv(command.csv, both)

@@ -8,8 +8,12 @@ RECORDINGS = Path("recordings")
 
 def free_name(folder: Path, source: str) -> Path:
     """A recording's path named after its source that does not exist yet: NAME.rrd, NAME-2.rrd, …"""
-    stem = Path(source.split("?")[0]).stem.replace("%", "") or "video"
-    return free(folder / f"{f'camera{stem}' if source.isdigit() else stem}.rrd")
+    return free(folder / f"{'camera' if source.isdigit() else ''}{stem(source)}.rrd")
+
+
+def stem(source: str) -> str:
+    """What is named after a video file, an image pattern or a URL."""
+    return Path(source.split("?")[0]).stem.replace("%", "") or "video"
 
 
 def beside(path: Path, what: str, *, overwrite: bool) -> Path:

@@ -10,8 +10,9 @@ from types import TracebackType
 from typing import Self
 
 import cv2
+import numpy as np
 
-from app.arrays import Image
+from app.arrays import Array, Image, Indices
 from app.files.writing import moved_when_complete
 from app.terminal.errors import UsageError
 
@@ -83,7 +84,7 @@ class VideoSink:
         self._writer.release()
 
     def check(self) -> None:
-        """See to it that every frame can be read again, and room is left: OpenCV does not say when a disk is full.
+        """Check that every frame can be read again and room is left: OpenCV does not tell when a disk is full.
 
         Raises:
             UsageError: no frame was written, or not all of them.
@@ -144,9 +145,19 @@ class PacedVideo:
             self._frames += 1
 
 
+def steady(times_s: Array) -> tuple[float, Indices]:
+    """Frames per second of a video, and how many times each frame (F,) is shown so that it keeps its time there."""
+    steps = np.diff(times_s)
+    if not (steps > 0).any():
+        return 25.0, np.ones(len(times_s), np.int64)
+    fps = float(1 / np.median(steps[steps > 0]))
+    ticks = np.round((times_s - times_s[0]) * fps).astype(np.int64)
+    return fps, np.diff(ticks, append=ticks[-1] + 1).clip(0)
+
+
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Nothing on stderr meanwhile: OpenCV finds fault with the codec's tag in .webm files and then writes them well."""
+    """Nothing on stderr meanwhile: OpenCV warns of the codec's tag in .webm files that it then writes well."""
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
@@ -159,7 +170,7 @@ def quiet() -> Iterator[None]:
 
 
 def check_video_format(path: Path) -> None:
-    """See to it that a video of that name can be written.
+    """Check that a video of that name can be written.
 
     Raises:
         UsageError: neither .mp4 nor .webm.

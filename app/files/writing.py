@@ -1,4 +1,4 @@
-"""Writing files and folders: seen to before the work, and under their names only when complete."""
+"""Writing files and folders: checked before the work, and under their names only when complete."""
 
 import json
 import shutil
@@ -12,7 +12,7 @@ from app.terminal.errors import UsageError
 
 
 def check_free(path: Path | None, *, overwrite: bool) -> None:
-    """See to it, before anything is computed, that a file can be written.
+    """Check, before anything is computed, that a file can be written.
 
     Raises:
         UsageError: it exists and may not be replaced, or its folder cannot be made.
@@ -32,7 +32,7 @@ def check_free(path: Path | None, *, overwrite: bool) -> None:
 
 
 def check_free_folder(folder: Path, *, overwrite: bool) -> None:
-    """See to it, before anything is computed, that files can be written into a folder of their own.
+    """Check, before anything is computed, that files can be written into a folder of their own.
 
     Raises:
         UsageError: there is something in it and may not be replaced, or it cannot be made.
@@ -56,12 +56,12 @@ def moved_when_complete(path: Path) -> Iterator[Path]:
     Raises:
         UsageError: the file cannot be written.
     """
-    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    part = path.with_name(f".{path.stem}.part{path.suffix}")  # hidden: *.rrd means finished ones
     try:
         yield part
         part.replace(path)
     except OSError as error:
-        raise no_space(path, error) from error
+        raise unwritable(path, error) from error
     finally:
         part.unlink(missing_ok=True)
 
@@ -96,13 +96,13 @@ def writable_folder(folder: Path, replaced: Iterable[str]) -> Iterator[Path]:
         for made in part.iterdir():
             made.replace(folder / made.name)
     except OSError as error:
-        raise no_space(folder, error) from error
+        raise unwritable(folder, error) from error
     finally:
         shutil.rmtree(part, ignore_errors=True)
 
 
-def no_space(path: Path, error: OSError) -> UsageError:
-    """What is told of a file or folder that could not be written to its end."""
+def unwritable(path: Path, error: OSError) -> UsageError:
+    """The error for a file or folder that could not be completed."""
     return UsageError(f"cannot write {path}: {error.strerror}; free some space or choose another place")
 
 

@@ -1,4 +1,4 @@
-"""What a person can choose of `run`; nothing heavy is imported here, so that `--help` is instant."""
+"""What a person can choose of `run` and `demo`; nothing heavy is imported here, so that `--help` is instant."""
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -112,6 +112,14 @@ class Run(Source):
     def json(self) -> bool:
         """Whether the summary is printed as JSON."""
         return self.output.json
+
+
+@dataclass(frozen=True)
+class Demo(Json):
+    """Render the sample video, reconstruct it, score it against its truth and record it to recordings/demo.rrd."""
+
+    view: bool = False
+    """Open the viewer and watch live."""
 
 
 def parse_range(text: str) -> tuple[int, int | None]:

@@ -77,7 +77,7 @@ class Session:
         """
         config, output = self._config, self._config.output
         video = Video(
-            config.source, *config.frame_range, duration_s=config.duration, drop_late=config.drop_late, say=self._told
+            config.source, *config.frame_range, duration_s=config.duration, drop_late=config.drop_late, log=self._told
         )
         with threadpool_limits(1), video:
             source = iter(video)
@@ -99,7 +99,7 @@ class Session:
 
     def _told(self, text: str) -> None:
         """What the source has to tell, in its own thread."""
-        self._progress.say(text)
+        self._progress.log(text)
         self._messages.append(text)
 
     def _objects(self, frame: Frame | None) -> Iterator[Processed]:
@@ -199,7 +199,7 @@ class Session:
         except ReconstructionError as error:
             if last and not self.interrupted:
                 raise
-            self._progress.say(in_a_line(error))
+            self._progress.log(in_a_line(error))
         if last:
             self._order.end(self._surface)
             self._watch.stop()
@@ -240,7 +240,7 @@ class Session:
 
     def _note(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:
         """Tell the person, and record it."""
-        self._progress.say(text)
+        self._progress.log(text)
         self._recording.tell("event", index, time_s, text, level)
 
     def _summary(self, tracked: TrackedObject) -> RunSummary:

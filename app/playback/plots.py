@@ -25,7 +25,7 @@ WIDTH_INCHES = 10.0
 
 
 def check_format(path: Path) -> None:
-    """See to it that a figure can be written in the format that the file's name asks for.
+    """Check that a figure can be written in the format that the file's name asks for.
 
     Raises:
         UsageError: an unknown one.

@@ -29,5 +29,5 @@ class Part(Progress):
     def at(self, done: int, total: int) -> None:
         """Not shown."""
 
-    def say(self, text: str) -> None:
+    def log(self, text: str) -> None:
         """Not shown: it is in the results."""

@@ -90,7 +90,7 @@ class Work:
         """One step is done, or a share of it."""
         self._bars.update(self._task, advance=share * self._step_s)
 
-    def say(self, text: str) -> None:
+    def log(self, text: str) -> None:
         """A line that stays."""
         stderr.print(text, style="dim", highlight=False, soft_wrap=True)
 

@@ -1,4 +1,4 @@
-"""What a person can do wrong, and the lines that say so.
+"""Mistakes in options and files, and the lines that report them.
 
 The packages `tracking` and `reconstruction` know no options: their errors say what they are `about`, and the option that
 helps is added here.

@@ -46,18 +46,18 @@ class Progress:
         self._bars.stop()
 
     def expect(self, frames: int | None) -> None:
-        """How many frames are to come, if known."""
+        """Set how many frames are to come, if known."""
         self._bars.update(self._task, total=frames)
 
     def advance(self, phase: str, error_px: float | None = None) -> None:
-        """One frame more."""
+        """Count one frame more."""
         error = "" if error_px is None else f"error {error_px:.2f} px"
         self._bars.update(self._task, advance=1, description=phase, error=error)
 
     def at(self, done: int, total: int) -> None:
-        """So many of so many."""
+        """Set how many are done, and of how many."""
         self._bars.update(self._task, completed=done, total=total)
 
-    def say(self, text: str) -> None:
-        """A line that stays."""
+    def log(self, text: str) -> None:
+        """Print a line that stays."""
         stderr.print(text, style="dim", highlight=False, soft_wrap=True)

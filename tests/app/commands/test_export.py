@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from app import demo
-from app.commands.export import default_path, export, held, steady
+from app.commands.export import default_path, export, held
 from app.options.export import Export
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
@@ -51,22 +51,6 @@ def test_glb_texture_has_the_video_s_colors_at_the_vertices(tmp_path: Path, run:
     px, py = np.rint(run.pixels).astype(int).T
     inside = np.abs(run.pixels - [80, 60]).min(axis=1) > 6  # away from the border between two colors
     assert np.abs(image[y, x].astype(int) - run.picture[py, px])[inside].max() < 25
-
-
-@pytest.mark.parametrize(
-    ("times", "fps", "shown"),
-    [
-        ([0, 0.1, 0.2, 0.3], 10, [1, 1, 1, 1]),
-        ([5, 5.1, 5.2, 5.5, 5.6], 10, [1, 1, 3, 1, 1]),
-        ([0, 0.1, 0.1, 0.2, 0.3], 10, [1, 0, 1, 1, 1]),
-        ([2.0], 25, [1]),
-        ([0, 0, 0], 25, [1, 1, 1]),
-    ],
-)
-def test_videos_keep_the_time(times: list[float], fps: float, shown: list[int]) -> None:
-    rate, counts = steady(np.array(times, float))
-    assert rate == pytest.approx(fps)
-    assert counts.tolist() == shown
 
 
 def test_gaps_hold_the_last_value_and_the_start_the_first() -> None:

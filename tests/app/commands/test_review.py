@@ -13,7 +13,6 @@ import pytest
 from app.commands.cli import carry_out
 from app.commands.review import review
 from app.options.review import Review
-from app.playback.facts import worst_frames
 from app.playback.measures import measures, reviewed
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
@@ -73,15 +72,6 @@ def test_json(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert facts["configuration"] == {"source": "sheet.mp4", "modes": 4}
     first, second = (worst["frame"] for worst in facts["worst_frames"][:2])
     assert abs(first - second) >= 5
-
-
-def test_worst_frames_are_of_different_incidents() -> None:
-    frames, rms_px = np.arange(100, 140), np.ones(40)
-    rms_px[[3, 4, 20]] = 5, 6, 4
-    rms_px[10] = np.nan
-    worst = worst_frames(frames, frames / 30, rms_px)
-    assert [row["frame"] for row in worst[:2]] == [104, 120]
-    assert worst[0]["rms_px"] == 6
 
 
 def test_table(path: Path, capsys: pytest.CaptureFixture[str]) -> None:

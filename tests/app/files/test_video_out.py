@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.files.video_out import PacedVideo, writable_video
+from app.files.video_out import PacedVideo, steady, writable_video
 from app.terminal.errors import UsageError
 from tracking.video import Video
 
@@ -33,3 +33,19 @@ def test_a_video_without_frames_leaves_nothing(tmp_path: Path) -> None:
          writable_video(tmp_path / "empty.webm", (64, 48), 10.0):  # fmt: skip
         pass
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("times", "fps", "shown"),
+    [
+        ([0, 0.1, 0.2, 0.3], 10, [1, 1, 1, 1]),
+        ([5, 5.1, 5.2, 5.5, 5.6], 10, [1, 1, 3, 1, 1]),
+        ([0, 0.1, 0.1, 0.2, 0.3], 10, [1, 0, 1, 1, 1]),
+        ([2.0], 25, [1]),
+        ([0, 0, 0], 25, [1, 1, 1]),
+    ],
+)
+def test_videos_keep_the_time(times: list[float], fps: float, shown: list[int]) -> None:
+    rate, counts = steady(np.array(times, float))
+    assert rate == pytest.approx(fps)
+    assert counts.tolist() == shown

@@ -81,7 +81,7 @@ def test_a_throttled_pipeline_stays_up_to_date(camera: Camera, monkeypatch: pyte
 def test_a_server_that_comes_back_is_used_again(camera: Camera) -> None:
     said: list[str] = []
     numbers = []
-    with Video(camera.url, say=said.append) as video:
+    with Video(camera.url, log=said.append) as video:
         for count, frame in enumerate(video):
             numbers.append(number_in(frame.image))
             if count == 20:
@@ -99,7 +99,7 @@ def test_a_server_that_comes_back_is_used_again(camera: Camera) -> None:
 
 def test_time_ends_a_run_even_when_the_server_is_gone(camera: Camera) -> None:
     said: list[str] = []
-    with Video(camera.url, duration_s=2.0, say=said.append) as video:
+    with Video(camera.url, duration_s=2.0, log=said.append) as video:
         for count, _ in enumerate(video):
             if count == 10:
                 camera.stop()
