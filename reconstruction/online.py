@@ -16,6 +16,8 @@ from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping import focal, rest_shape
 from reconstruction.mapping.evidence import TURN_DEGREES, weigh
 from reconstruction.mapping.factorization import view_turn_degrees
+from reconstruction.mapping.map import Map, ratio_of_sizes
+from reconstruction.mapping.mapper import Mapper, Start, at_once
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.settings import Deformation, Metric, Settings
 from reconstruction.window import priors
@@ -42,8 +44,10 @@ class Reconstruction:
         settings: how to reconstruct.
         given: a rest shape (3, p) from elsewhere.
         mesh: its mesh, if it has one.
+        start: where maps are made meanwhile; they are in force after the same number of frames anywhere.
 
     Attributes:
+        map: what the keyframes said the object is; None while the first frames' word stands.
         rest: the rest shape, once there is one.
         window: the sliding window, once there is a rest shape.
         bootstrap_frames: frames the bootstrap took.
@@ -53,12 +57,20 @@ class Reconstruction:
     """
 
     def __init__(
-        self, camera: Camera, settings: Settings, given: RestShape | None = None, mesh: Mesh | None = None
+        self,
+        camera: Camera,
+        settings: Settings,
+        given: RestShape | None = None,
+        mesh: Mesh | None = None,
+        start: Start = at_once,
     ) -> None:
         if settings.energy == "paper" and camera.perspective:
             raise ReconstructionError("energy paper needs an orthographic camera", "energy")
         self.camera, self.settings = camera, settings
         self.rest = given
+        self.map: Map | None = None
+        maps = given is None and settings.rest_shape == "auto" and settings.energy != "paper"
+        self._mapper = Mapper(start) if maps else None
         self._mesh = mesh
         self.window: SlidingWindow | None = None
         self.bootstrap_frames = 0
@@ -103,8 +115,10 @@ class Reconstruction:
         Raises:
             ReconstructionError: no rest shape can be had from the frames so far.
         """
+        if self._mapper is not None:
+            self._replace(self._mapper.add(W, visible, self.camera, estimate_focal=self.settings.estimate_focal))
         if self.window is not None:
-            return [self.window.advance(W, visible)]
+            return [self.window.advance(W, visible, self.map and self.map.shape(W, visible))]
         if self.settings.modes >= W.shape[1]:
             problem = f"modes {self.settings.modes} does not fit {W.shape[1]} points: choose fewer"
             raise ReconstructionError(problem, "modes")
@@ -127,6 +141,28 @@ class Reconstruction:
     def finish(self) -> list[ShapeEstimate]:
         """No more frames: settle for what the bootstrap has; returns the shapes of its frames."""
         return self._decide(last=True) if self.window is None and self._waiting else []
+
+    def revise(self) -> bool:
+        """Make a last map of all keyframes; whether it is to be believed, and all frames are worth another pass from the first.
+
+        The next frame to `update` is the first one again, then.
+        """
+        if self._mapper is None or self.window is None:
+            return False
+        mapper, self._mapper = self._mapper, None
+        return self._replace(mapper.finish(self.camera, estimate_focal=self.settings.estimate_focal))
+
+    def _replace(self, found: Map | None) -> bool:
+        """Put a map in force, if there is one, in the size of the model before it."""
+        if found is None or self.window is None:
+            return False
+        frame = self.window.frames
+        self.map = found = found.scaled(ratio_of_sizes(self.window.model.basis.rest, found.rest.motion.shape))
+        self.camera, self.deformation = found.camera, self.settings.deformation
+        self.focal_note = f"focal length {found.camera.focal_px:.0f} px" if self.camera.perspective else ""
+        self._build(found.rest)
+        self.window.frames = frame
+        return True
 
     def _decide(self, last: bool) -> list[ShapeEstimate]:
         W = np.stack([w for w, _ in self._waiting])
@@ -166,14 +202,22 @@ class Reconstruction:
         return self._start(replace(rest, note=rest.note + remark))
 
     def _start(self, rest: RestShape) -> list[ShapeEstimate]:
-        self.rest, self.bootstrap_frames = rest, len(self._waiting)
-        self.deformation = constraints.fitting(self.deformation, flat=rest.flat)
-        self.metric = distances.fitting(self.settings.metric, flat=rest.flat)
+        """The shapes of the frames that wait, with this rest shape."""
+        self.bootstrap_frames = len(self._waiting)
+        self._build(rest)
+        assert self.window is not None
+        waiting, self._waiting = self._waiting, []
+        return [self.window.advance(W, visible) for W, visible in waiting]
+
+    def _build(self, rest: RestShape) -> None:
+        """The model and the window of a rest shape."""
+        self.rest = rest
+        sheet = rest.flat or rest.kind == "isometric"
+        self.deformation = constraints.fitting(self.deformation, flat=sheet)
+        self.metric = distances.fitting(self.settings.metric, flat=sheet)
         model = build_model(rest, self.camera, self.settings.modes, self.metric, self._mesh)
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
-        refine = self.settings.refine_rest and not paper
+        refine = self.settings.refine_rest and not paper and self.map is None
         guides = build_guides(model, self.deformation, paper=paper)
         self.window = SlidingWindow(model, energy, self.settings.window, rest.motion, refine=refine, guides=guides)
-        waiting, self._waiting = self._waiting, []
-        return [self.window.advance(W, visible) for W, visible in waiting]

@@ -74,6 +74,14 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
             estimates += reconstruction.update(np.where(h, w, np.nan), h)
             progress.advance(reconstruction.phase.value)
         estimates += reconstruction.finish()
+        online = estimates
+        if reconstruction.revise():
+            progress.expect(2 * frames)
+            estimates = []
+            for w, h in zip(W, visible, strict=True):
+                estimates += reconstruction.update(np.where(h, w, np.nan), h)
+                progress.advance("final pass")
+            estimates = [replace(e, frame=k) for k, e in enumerate(estimates)]
         elapsed_ms = (perf_counter() - started) * 1e3
     for estimate in estimates:
         collected.add(estimate.frame, estimate)
@@ -83,8 +91,10 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
         save_shapes(config.shapes_out, collected.estimates, reconstruction.model)
     scores = None
     if tracks.S_gt is not None and tracks.gt_frames is not None:
-        shapes = np.stack([collected.estimates[int(f)].shape for f in tracks.gt_frames])
-        scores = Scores.of(score(shapes, rest.motion.shape, tracks.S_gt, tracks.gt_frames))
+        shapes, before = (np.stack([made[int(f)].shape for f in tracks.gt_frames]) for made in (estimates, online))
+        result = score(shapes, rest.motion.shape, tracks.S_gt, tracks.gt_frames)
+        scores = Scores.of(result)
+        print("ONLINE", score(before, rest.motion.shape, tracks.S_gt, tracks.gt_frames).e3d)
     camera = reconstruction.camera
     return Evaluation(
         tracks=str(config.tracks),

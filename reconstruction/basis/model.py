@@ -7,12 +7,13 @@ from reconstruction.basis.constraints import CoarseEdges
 from reconstruction.basis.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges
 from reconstruction.basis.modes import ModalBasis, modal_basis, principal_axes
 from reconstruction.basis.rest_shape import RestShape, rms_radius
-from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.camera import Camera, nearest_rotation, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
 from reconstruction.state import State
 
 COARSE_VERTICES = 60
+FITTING_SWEEPS = 15  # of pose and Λ in turn
 
 
 class Model:
@@ -69,6 +70,18 @@ class Model:
         return ShapeEstimate(
             frame, quaternion_from_rotation(R), R, t, s, Lambda, shape, projection.T.copy(), residual, visible
         )
+
+    def state_of(self, shape: Array) -> State:
+        """Pose and Λ' (n = 1) with which the model comes nearest to a shape (3, p) in camera axes and pixels."""
+        centre = shape.mean(axis=1, keepdims=True)
+        rest, Upsilon = self.B[:3] * self.radius, self.basis.Upsilon
+        deformation = np.zeros((3, len(Upsilon)))
+        for _ in range(FITTING_SWEEPS):
+            R = nearest_rotation((shape - centre) @ (rest + deformation @ Upsilon).T)
+            deformation = (R.T @ (shape - centre) - rest) @ Upsilon.T
+        s = self.camera.focal_px / centre[2, 0] if self.camera.perspective else 1.0
+        t = s * centre[:2, 0] / self.radius
+        return State(quaternion_from_rotation(R)[None], t[None], np.array([np.log(s)]), deformation[None] / self.unit)
 
     def coarse_edges(self, vertices: int = COARSE_VERTICES) -> CoarseEdges:
         """Edges of a coarse mesh through well-spread points, triangulated in the main plane."""

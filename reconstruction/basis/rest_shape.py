@@ -7,7 +7,7 @@ import numpy as np
 
 from reconstruction.arrays import Array
 
-Kind = Literal["rigid", "plane", "mesh", "truth"]
+Kind = Literal["rigid", "plane", "isometric", "mesh", "truth"]
 
 FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
 

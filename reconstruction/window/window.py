@@ -31,6 +31,7 @@ REWEIGHTED = 0.005  # share of the weights that must change for another round
 LEAST_SURPRISE = 1e-5  # energy of a new frame, a misfit of 0.3 % of the size, up to which other bends are not tried
 SURPRISE = 2.0  # times the usual energy of a new frame, above which they are
 BENT_GAIN = 0.95  # another bend must cost less than this share of the window's energy
+EXPECTED = 0.3  # weight of the pull to a shape that is expected
 RENEWED = 0.1  # weight of the newest frame in running means
 
 
@@ -49,6 +50,7 @@ class SlidingWindow:
 
     Attributes:
         state: the window's frames; None before the first.
+        frames: so many so far.
     """
 
     def __init__(
@@ -71,14 +73,23 @@ class SlidingWindow:
         self._before: Previous | None = None  # the frame that has left the window
         self._lost: State | None = None  # the last frame before a restart
         self._data: list[Statistics] = []
-        self._frame = -1
+        self.frames = 0
         self._rest = Refinement(len(model.basis.eigenvalues))
         self._refine = refine
         self._switch: Switch | None = None  # of the newest frame
 
-    def advance(self, W: Array, visible: Mask) -> ShapeEstimate:
-        """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape."""
-        self._frame += 1
+    def advance(self, W: Array, visible: Mask, expected: Array | None = None) -> ShapeEstimate:
+        """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape.
+
+        Args:
+            W: (2, p) px; anything where not visible.
+            visible: (p,).
+            expected: (3, p) in camera axes and pixels, what is known of the shape from elsewhere; the frame starts there, and
+                is pulled there instead of to the rest shape.
+        """
+        if expected is not None:
+            return self._near(W, visible, self.model.state_of(expected))
+        self.frames += 1
         self._switch = None
         weights = start_weights(self._last_shape(), W, visible, self.model.radius)
         self._data.append(image_statistics(self.model, W, weights))
@@ -93,7 +104,18 @@ class SlidingWindow:
         self.state = found.state
         if self._energy.adaptive:
             self._weigh_rest(self.state[-1:])
-        return replace(self.model.estimate(self._frame, W, visible, self._as_shown(self.state)), switch=self._switch)
+        return replace(self.model.estimate(self.frames - 1, W, visible, self._as_shown(self.state)), switch=self._switch)
+
+    def _near(self, W: Array, visible: Mask, expected: State) -> ShapeEstimate:
+        """The next frame by itself, near to what is expected."""
+        self.frames += 1
+        data = image_statistics(self.model, W, robust_weights(self.model.residuals(W, expected), visible))
+        energy = replace(self._energy, centre=expected.Lambda[0], rest=EXPECTED, edges=None, tied=False)
+        found = minimise(energy, data, expected, None, ADJUST).state
+        # The frame before stays for the prediction.
+        self.state = found if self.state is None else join([self.state[-1:], found])
+        self._data, self._before = [*self._data[-1:], data], None
+        return self.model.estimate(self.frames - 1, W, visible, found)
 
     def restart(self) -> None:
         """The surface was lost: the next frame is tied to nothing, and starts from the rest or from the last shape."""

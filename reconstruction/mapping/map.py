@@ -1,0 +1,143 @@
+"""What the object is, by its keyframes: which kind of thing, its rest shape, its camera, and its shape in any frame."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from reconstruction import ReconstructionError
+from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.basis.mesh import triangulate, unique_edges
+from reconstruction.basis.rest_shape import RestShape, RigidMotion
+from reconstruction.camera import Camera, nearest_rotation
+from reconstruction.mapping.isometric.adjustment import sheet
+from reconstruction.mapping.isometric.focal import focal, with_focal
+from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.selection import Evidence, select
+from reconstruction.mapping.solid.solid import bundle_adjust
+
+FEWEST_KEYFRAMES = 6
+BESIDE = 4  # known points that say where an unknown one is
+
+
+@dataclass(frozen=True)
+class Map:
+    """What an object is.
+
+    Attributes:
+        rest: the rest shape, posed in each keyframe; pixels of the first keyframe.
+        camera: with the focal length that the keyframes hold, else as given.
+        evidence: why it is that kind of thing.
+        images: (K, 2, p) px of the keyframes, and
+        visible: (K, p) what is seen in them.
+        sheet: its depths and lengths, if it is a sheet.
+        unit_px: pixels of the first keyframe in a unit of the sheet.
+    """
+
+    rest: RestShape
+    camera: Camera
+    evidence: Evidence
+    images: Array
+    visible: Mask
+    sheet: IsometricSheet | None = None
+    unit_px: float = 1.0
+
+    def shape(self, W: Array, visible: Mask) -> Array | None:
+        """The sheet (3, p) in camera axes and pixels in another frame (2, p) px, by its lengths; None for a solid."""
+        if self.sheet is None:
+            return None
+        found = self.sheet.finish(np.where(visible, W, 0.0)[None], visible[None]).shapes()[0]
+        return self.unit_px * completed(found, self.rest.motion.shape)
+
+    def scaled(self, factor: float) -> "Map":
+        """The same, so many times as large, and so many times as far away."""
+        motion = self.rest.motion
+        motion = RigidMotion(factor * motion.shape, motion.R, motion.s / factor, motion.t)
+        return replace(self, rest=replace(self.rest, motion=motion), unit_px=factor * self.unit_px)
+
+
+def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool) -> Map | None:
+    """What keyframes W (K, 2, p) px with visibility (K, p) show, most different ones first; None where they do not tell.
+
+    Args:
+        W: anything where not visible.
+        visible: (K, p).
+        camera: its focal length may be a guess, if it is to be estimated.
+        estimate_focal: whether the keyframes may change the focal length.
+    """
+    if len(W) < FEWEST_KEYFRAMES:
+        return None
+    try:
+        evidence = select(W, visible, camera, lambda w, h, c: sheet(w, h, c).shapes())
+        if evidence.kind == "sheet":
+            return sheet_map(W, visible, camera, evidence, estimate_focal=estimate_focal)
+        if evidence.kind == "solid":
+            found = bundle_adjust(W, visible, camera, refine_focal=estimate_focal)
+            rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
+            return Map(rest, found.camera, evidence, W, visible)
+    except ReconstructionError:
+        pass
+    return None
+
+
+def sheet_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool) -> Map:
+    """The map of a sheet: its rest shape is the keyframe's shape that is nearest to all others.
+
+    Raises:
+        ReconstructionError: there are too few points.
+    """
+    found = sheet(W, visible, camera)
+    if estimate_focal:
+        search = focal(found)
+        if search.known:
+            found = with_focal(found, search.focal_px)
+    shapes = found.shapes()
+    known = np.isfinite(shapes).all(axis=(0, 1))
+    middle = medoid(shapes[:, :, known])
+    unit_px = found.camera.focal_px / float(shapes[0, 2, known].mean())
+    whole = completed(shapes[middle], shapes[middle])
+    centre = whole.mean(axis=1, keepdims=True)
+    rest = whole - centre
+    poses = [nearest_rotation((S - S.mean(axis=1, keepdims=True)) @ rest[:, known].T) for S in shapes[:, :, known]]
+    origin = np.stack(
+        [S[:, known].mean(axis=1) - R @ rest[:, known].mean(axis=1) for S, R in zip(shapes, poses, strict=True)]
+    )
+    s = found.camera.focal_px / (unit_px * origin[:, 2])
+    motion = RigidMotion(unit_px * rest, np.stack(poses), s, (s * unit_px)[:, None] * origin[:, :2])
+    note = f"sheet from {len(W)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
+    return Map(RestShape("isometric", motion, note), found.camera, evidence, W, visible, found, unit_px)
+
+
+def medoid(shapes: Array) -> int:
+    """The shape (F, 3, p) that is nearest to all others, each turned as fits best."""
+    centred = shapes - shapes.mean(axis=2, keepdims=True)
+    nearness = np.linalg.svd(np.einsum("aip,bjp->abij", centred, centred), compute_uv=False).sum(axis=2)
+    size = (centred**2).sum(axis=(1, 2))
+    return int((size[:, None] + size - 2 * nearness).clip(0).sum(axis=1).argmin())
+
+
+def completed(shape: Array, like: Array) -> Array:
+    """A shape (3, p) with its unknown points, NaN, where those beside them in another shape (3, p) are; else at the centre."""
+    unknown = np.isnan(shape[0])
+    if not unknown.any():
+        return shape
+    whole = shape.copy()
+    whole[:, unknown] = np.nanmean(shape, axis=1)[:, None]
+    placed = unknown & np.isfinite(like[0])
+    for i in np.flatnonzero(placed):
+        beside = np.argsort(np.where(unknown, np.inf, ((like - like[:, i : i + 1]) ** 2).sum(axis=0)))[:BESIDE]
+        whole[:, i] = shape[:, beside].mean(axis=1)
+    return whole
+
+
+def ratio_of_sizes(shape: Array, other: Array) -> float:
+    """How many times as long the edges of a shape (3, p) are as those of another (3, p), in the mean of logarithms."""
+    i, j = mesh_edges(other).T
+    lengths = [np.linalg.norm(S[:, i] - S[:, j], axis=0) for S in (shape, other)]
+    good = (lengths[0] > 0) & (lengths[1] > 0)
+    return float(np.exp(np.mean(np.log(lengths[0][good] / lengths[1][good]))))
+
+
+def mesh_edges(shape: Array) -> Indices:
+    """Edges (n, 2) of a shape's points (3, p), triangulated in its main plane."""
+    centred = shape - shape.mean(axis=1, keepdims=True)
+    return unique_edges(triangulate((np.linalg.svd(centred, full_matrices=False)[0][:, :2].T @ centred).T).faces)
