@@ -118,7 +118,7 @@ class Reconstruction:
         if self._mapper is not None:
             self._replace(self._mapper.add(W, visible, self.camera, estimate_focal=self.settings.estimate_focal))
         if self.window is not None:
-            return [self.window.advance(W, visible, self.map and self.map.shape(W, visible))]
+            return [self.window.advance(W, visible, None if self.map is None else self.map.shape(W, visible))]
         if self.settings.modes >= W.shape[1]:
             problem = f"modes {self.settings.modes} does not fit {W.shape[1]} points: choose fewer"
             raise ReconstructionError(problem, "modes")
@@ -143,7 +143,7 @@ class Reconstruction:
         return self._decide(last=True) if self.window is None and self._waiting else []
 
     def revise(self) -> bool:
-        """Make a last map of all keyframes; whether it is to be believed, and all frames are worth another pass from the first.
+        """Make a last map of all keyframes; whether there is one, so that all frames are worth another pass.
 
         The next frame to `update` is the first one again, then.
         """
@@ -156,12 +156,10 @@ class Reconstruction:
         """Put a map in force, if there is one, in the size of the model before it."""
         if found is None or self.window is None:
             return False
-        frame = self.window.frames
         self.map = found = found.scaled(ratio_of_sizes(self.window.model.basis.rest, found.rest.motion.shape))
         self.camera, self.deformation = found.camera, self.settings.deformation
         self.focal_note = f"focal length {found.camera.focal_px:.0f} px" if self.camera.perspective else ""
         self._build(found.rest)
-        self.window.frames = frame
         return True
 
     def _decide(self, last: bool) -> list[ShapeEstimate]:

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import tyro
 
-from app.options.shared import FromTracks, Json, Overwrite
+from app.options.shared import FinalPass, FromTracks, Json, Overwrite
 from app.terminal.errors import UsageError
 
 
 @dataclass(frozen=True)
-class Evaluate(Json, Overwrite, FromTracks):
+class Evaluate(Json, Overwrite, FinalPass, FromTracks):
     """Reconstruct from given tracks and score against the truth in the file.
 
     Examples:

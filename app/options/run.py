@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import tyro
 
 from app.options.model import Model, priors_text
-from app.options.shared import Json, Overwrite
+from app.options.shared import FinalPass, Json, Overwrite
 from app.terminal.errors import UsageError
 
 
@@ -41,7 +41,7 @@ class Output(Json, Overwrite):
 
 
 @dataclass(frozen=True)
-class Source:
+class Source(FinalPass):
     """What is reconstructed from: the options that `run` and `retexture` share."""
 
     source: tyro.conf.Positional[str]
@@ -78,6 +78,11 @@ class Source:
             raise UsageError(f"--place {area} has no area: give X Y WIDTH HEIGHT, both sizes 1 and more")
         if not 0 <= self.opacity <= 1:
             raise UsageError(f"--opacity {self.opacity} is no opacity: give 0 to 1")
+
+    @property
+    def stored(self) -> bool:
+        """Whether the source is a file: it ends, and nobody waits for it."""
+        return not (self.source.isdigit() or "://" in self.source)
 
     @property
     def frame_range(self) -> tuple[int, int | None]:

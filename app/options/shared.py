@@ -33,3 +33,11 @@ class FromTracks:
     camera: Literal["auto", "perspective", "orthographic"] = "auto"
     """Auto: perspective if the tracks have K, else orthographic."""
     model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FinalPass:
+    """What happens when the last frame is done."""
+
+    final_pass: bool = True
+    """Reconstruct all frames once more with what is known of the surface at the end; not of cameras and streams."""

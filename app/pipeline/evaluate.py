@@ -8,6 +8,7 @@ from time import perf_counter
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from app.arrays import Array, Flags
 from app.files.mesh_file import rest_of_vertices
 from app.files.writing import check_free
 from app.options.evaluate import Evaluate
@@ -20,6 +21,7 @@ from reconstruction.basis import rest_shape
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
+from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import score, with_missing, with_noise, with_outliers
 from reconstruction.online import Reconstruction
 from tracking.tracks import Tracks
@@ -45,6 +47,7 @@ class Evaluation(Summary):
     reprojection_rms: float | None
     ms_per_frame: float
     score: Scores | None = None
+    e3d_online: float | None = None
 
 
 def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
@@ -69,32 +72,24 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
     with threadpool_limits(1), progress:
         progress.expect(frames)
         started = perf_counter()
-        estimates = []
-        for w, h in zip(W, visible, strict=True):
-            estimates += reconstruction.update(np.where(h, w, np.nan), h)
-            progress.advance(reconstruction.phase.value)
+        estimates = online = reconstructed(reconstruction, W, visible, progress)
         estimates += reconstruction.finish()
-        online = estimates
-        if reconstruction.revise():
-            progress.expect(2 * frames)
-            estimates = []
-            for w, h in zip(W, visible, strict=True):
-                estimates += reconstruction.update(np.where(h, w, np.nan), h)
-                progress.advance("final pass")
-            estimates = [replace(e, frame=k) for k, e in enumerate(estimates)]
+        if config.final_pass and reconstruction.revise():
+            estimates = reconstructed(reconstruction, W, visible, progress)
         elapsed_ms = (perf_counter() - started) * 1e3
-    for estimate in estimates:
-        collected.add(estimate.frame, estimate)
+    for k, estimate in enumerate(estimates):
+        collected.add(k, estimate)
     rest = reconstruction.rest
     assert rest is not None
     if config.shapes_out:
         save_shapes(config.shapes_out, collected.estimates, reconstruction.model)
-    scores = None
+    scores = before = None
     if tracks.S_gt is not None and tracks.gt_frames is not None:
-        shapes, before = (np.stack([made[int(f)].shape for f in tracks.gt_frames]) for made in (estimates, online))
-        result = score(shapes, rest.motion.shape, tracks.S_gt, tracks.gt_frames)
-        scores = Scores.of(result)
-        print("ONLINE", score(before, rest.motion.shape, tracks.S_gt, tracks.gt_frames).e3d)
+        truth = tracks.S_gt, tracks.gt_frames
+        scores, before = (
+            Scores.of(score(np.stack([made[int(f)].shape for f in tracks.gt_frames]), rest.motion.shape, *truth))
+            for made in (estimates, online)
+        )
     camera = reconstruction.camera
     return Evaluation(
         tracks=str(config.tracks),
@@ -113,7 +108,17 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
         reprojection_rms=collected.reprojection_rms_px,
         ms_per_frame=elapsed_ms / frames,
         score=scores,
+        e3d_online=before.e3d if before and estimates is not online else None,
     )
+
+
+def reconstructed(reconstruction: Reconstruction, W: Array, visible: Flags, progress: Progress) -> list[ShapeEstimate]:
+    """The shapes known with each frame of tracks W (F, 2, P) px, visible (F, P)."""
+    estimates = []
+    for w, h in zip(W, visible, strict=True):
+        estimates += reconstruction.update(np.where(h, w, np.nan), h)
+        progress.advance(reconstruction.phase.value)
+    return estimates
 
 
 def prepare(config: Evaluate, tracks: Tracks) -> Reconstruction:

@@ -196,6 +196,8 @@ class Session:
         """
         try:
             self._record(self._object.finish())
+            if not self.interrupted:
+                self._revise()
         except ReconstructionError as error:
             if last and not self.interrupted:
                 raise
@@ -208,6 +210,15 @@ class Session:
         if self._surface is not None:  # its figure would have slowed the run
             self._recording.tell("modes", self._surface.model.basis, self._surface.model.mesh, self._surface.metric)
         self._object.save()
+        self._object.close()
+
+    def _revise(self) -> None:
+        """Record all frames once more, with what the object turned out to be."""
+        for count, shape in enumerate(self._object.revised()):
+            if count == 0:
+                self._begin_surface(shape.index, shape.time_s)
+            self._recording.tell("estimate", shape.index, shape.time_s, shape.estimate)
+            self._progress.advance("final pass", self._object.collected.last_rms_px)
 
     def _begin_another(self, frame: Frame) -> None:
         """From this frame on the successor is followed, in a recording of its own."""

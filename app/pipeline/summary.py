@@ -32,6 +32,7 @@ class RunSummary(Summary):
         branch_switches: how often the window took another branch.
         reprojection_rms_px: over all visible points of all frames.
         score: errors against the truth.
+        e3d_online: the error of what was shown on the way, if there was another pass.
         visible_share: of the points, mean over the frames.
         visible_share_last: in the last frame.
         objects: followed one after another.
@@ -60,6 +61,7 @@ class RunSummary(Summary):
     branch_switches: int
     reprojection_rms_px: float | None
     score: Scores | None = None
+    e3d_online: float | None = None
     visible_share: float | None
     visible_share_last: float | None
     objects: int
@@ -89,6 +91,7 @@ def summary_of(
     """The summary of a run and of one of its objects."""
     reconstruction, collected = tracked.reconstruction, tracked.collected
     rest, camera = reconstruction.rest, reconstruction.camera
+    online = tracked.score(tracked.online)
     several = recordings[0] is not None and len(recordings) > 1
     return RunSummary(
         source=tracked.config.source,
@@ -105,7 +108,8 @@ def summary_of(
         focal_note=reconstruction.focal_note or None,
         branch_switches=collected.switches,
         reprojection_rms_px=collected.reprojection_rms_px,
-        score=Scores.of(tracked.score) if tracked.score else None,
+        score=tracked.score(tracked.collected),
+        e3d_online=online.e3d if online else None,
         visible_share=counts.visible_share,
         visible_share_last=counts.visible_share_last,
         objects=counts.objects,

@@ -1,5 +1,6 @@
 """One object of a run: its points, who follows them, who makes shapes of them, and what is kept of it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,12 +10,13 @@ from app.files.writing import writable
 from app.options.run import Run, configuration
 from app.painting.compositing import Placement, painted
 from app.painting.picture import first_picture
-from app.pipeline.estimates import Collected, save_shapes
+from app.pipeline.estimates import Collected, Scores, save_shapes
+from app.pipeline.map_process import MapProcess
 from app.pipeline.prepare import prepared
 from app.pipeline.processed import Surface
 from app.pipeline.stopwatch import Stopwatch
+from app.pipeline.stored_tracks import StoredFrame, StoredTracks
 from reconstruction.estimate import ShapeEstimate
-from reconstruction.evaluation import Score
 from reconstruction.online import Phase
 from tracking.guarded import Change, Guarded, GuardedTracker
 from tracking.klt import Observation
@@ -46,6 +48,7 @@ class TrackedObject:
         points_px: (P, 2) its points in the first frame.
         reconstruction: its estimator.
         collected: its estimates.
+        online: its estimates as they were shown on the way, if there was another pass; else None.
 
     Raises:
         UsageError, TrackingError: a region, mask, mesh or truth that does not fit, or too few corners.
@@ -54,13 +57,16 @@ class TrackedObject:
     def __init__(self, config: Run, first: Frame, watch: Stopwatch) -> None:
         self.config, self.first, self._watch = config, first, watch
         self._truth = Truth.load(config.ground_truth) if config.ground_truth else None
-        truth_frames = frozenset(self._truth.frames.tolist()) if self._truth else frozenset()
-        self.collected = Collected(config.output.shapes_out is not None, truth_frames)
+        self.collected = self._nothing()
+        self.online: Collected | None = None
         self._texture = first_picture(config.texture) if config.texture else None
-        self.points_px, self.reconstruction = prepared(config, first)
+        self._maps = MapProcess()
+        self.points_px, self.reconstruction = prepared(config, first, self._maps.start)
         self._tracker = GuardedTracker(first.image, self.points_px)
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
-        self._tracks: list[Observation] = []
+        passes = config.final_pass and config.stored and config.output.split_minutes is None
+        self._stored = StoredTracks(len(self.points_px)) if passes or config.output.tracks_out else None
+        self._passes = passes
 
     @property
     def lost(self) -> bool:
@@ -127,8 +133,8 @@ class TrackedObject:
         Raises:
             ReconstructionError: no rest shape can be had.
         """
-        if self.config.output.tracks_out:
-            self._tracks.append(observation)
+        if self._stored is not None:
+            self._stored.add(StoredFrame(frame.index, frame.time_s, observation, self.lost))
         if self.lost:
             self.collected.lose(frame.index)
             return []
@@ -145,13 +151,39 @@ class TrackedObject:
         with self._watch.time("reconstruct"):
             return self._of_frames(self.reconstruction.finish())
 
-    @property
-    def score(self) -> Score | None:
-        """Errors against the truth; None without one, or before there is a shape."""
+    def revised(self) -> Iterator[FrameShape]:
+        """The shapes of all frames once more, with a last map; none where that tells nothing new."""
+        with self._watch.time("reconstruct"):
+            if not self._passes or not self.reconstruction.revise():
+                return
+        assert self._stored is not None
+        self.online, self.collected = self.collected, self._nothing()
+        lost = False
+        for stored in self._stored:
+            if stored.lost:
+                self.collected.lose(stored.index)
+                lost = True
+                continue
+            if lost:
+                self.reconstruction.restart()
+                lost = False
+            self._times[stored.index] = stored.time_s
+            with self._watch.time("reconstruct"):
+                seen = stored.observation
+                shapes = self._of_frames(self.reconstruction.update(seen.points_px.T, seen.visible))
+            yield from shapes
+
+    def close(self) -> None:
+        """End what works for it elsewhere."""
+        self._maps.close()
+
+    def score(self, collected: Collected | None) -> Scores | None:
+        """Errors of estimates against the truth; None without one, or before there is a shape."""
         rest = self.reconstruction.rest
-        if self._truth is None or rest is None:
+        if self._truth is None or rest is None or collected is None:
             return None
-        return self.collected.score_against(self._truth, rest.motion.shape, self.reconstruction.model.mesh)
+        result = collected.score_against(self._truth, rest.motion.shape, self.reconstruction.model.mesh)
+        return Scores.of(result) if result else None
 
     def save(self) -> None:
         """Write the files asked for.
@@ -160,14 +192,19 @@ class TrackedObject:
             UsageError: one cannot be written.
         """
         output = self.config.output
-        if output.tracks_out and self._tracks:
-            W = np.stack([o.points_px.T for o in self._tracks])
-            visible = np.stack([o.visible for o in self._tracks])
+        if output.tracks_out and self._stored is not None:
+            tracks = [stored.observation for stored in self._stored]
+            W, visible = np.stack([o.points_px.T for o in tracks]), np.stack([o.visible for o in tracks])
             camera = self.reconstruction.camera
             with writable(output.tracks_out) as file:
                 Tracks(W, visible, K=camera.K if camera.perspective else None).save(file)
         if output.shapes_out and self.collected.estimates:
             save_shapes(output.shapes_out, self.collected.estimates, self.reconstruction.model, self.collected.lost)
+
+    def _nothing(self) -> Collected:
+        """No estimates yet."""
+        truth_frames = frozenset(self._truth.frames.tolist()) if self._truth else frozenset()
+        return Collected(self.config.output.shapes_out is not None, truth_frames)
 
     def _of_frames(self, estimates: list[ShapeEstimate]) -> list[FrameShape]:
         """Estimates with the oldest frames that wait for one."""

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from app.terminal.exit_code import ExitCode
 
-PERCENT = ("visible_share", "visible_share_last", "e3d", "e3d_camera", "e3d_static", "e3d_sign_free")
+PERCENT = ("visible_share", "visible_share_last", "e3d", "e3d_camera", "e3d_static", "e3d_sign_free", "e3d_online")
 
 
 @dataclass(frozen=True)

@@ -116,7 +116,7 @@ def medoid(shapes: Array) -> int:
 
 
 def completed(shape: Array, like: Array) -> Array:
-    """A shape (3, p) with its unknown points, NaN, where those beside them in another shape (3, p) are; else at the centre."""
+    """A shape (3, p) with its unknown points, NaN, where their neighbours in another are, else at the centre."""
     unknown = np.isnan(shape[0])
     if not unknown.any():
         return shape

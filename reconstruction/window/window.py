@@ -84,8 +84,8 @@ class SlidingWindow:
         Args:
             W: (2, p) px; anything where not visible.
             visible: (p,).
-            expected: (3, p) in camera axes and pixels, what is known of the shape from elsewhere; the frame starts there, and
-                is pulled there instead of to the rest shape.
+            expected: (3, p) in camera axes and pixels, the shape by other knowledge; the frame starts there, and is
+                pulled there instead of to the rest shape.
         """
         if expected is not None:
             return self._near(W, visible, self.model.state_of(expected))
