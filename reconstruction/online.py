@@ -118,7 +118,10 @@ class Reconstruction:
         if self._mapper is not None:
             self._replace(self._mapper.add(W, visible, self.camera, estimate_focal=self.settings.estimate_focal))
         if self.window is not None:
-            return [self.window.advance(W, visible, None if self.map is None else self.map.shape(W, visible))]
+            if self.map is None:
+                return [self.window.advance(W, visible)]
+            last = None if self.window.state is None else self.window.last_shape()
+            return [self.window.advance(W, visible, self.map.expected(self.window.model, W, visible, last))]
         if self.settings.modes >= W.shape[1]:
             problem = f"modes {self.settings.modes} does not fit {W.shape[1]} points: choose fewer"
             raise ReconstructionError(problem, "modes")
@@ -216,6 +219,6 @@ class Reconstruction:
         model = build_model(rest, self.camera, self.settings.modes, self.metric, self._mesh)
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
-        refine = self.settings.refine_rest and not paper and self.map is None
+        refine = self.settings.refine_rest and not paper and rest.kind != "isometric"
         guides = build_guides(model, self.deformation, paper=paper)
         self.window = SlidingWindow(model, energy, self.settings.window, rest.motion, refine=refine, guides=guides)

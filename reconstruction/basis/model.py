@@ -71,15 +71,20 @@ class Model:
             frame, quaternion_from_rotation(R), R, t, s, Lambda, shape, projection.T.copy(), residual, visible
         )
 
-    def state_of(self, shape: Array) -> State:
-        """Pose and Λ' (n = 1) with which the model comes nearest to a shape (3, p) in camera axes and pixels."""
+    def state_of(self, shape: Array, focal_px: float) -> State:
+        """Pose and Λ' (n = 1) with which the model comes nearest to a shape.
+
+        Args:
+            shape: (3, p) in camera axes and pixels.
+            focal_px: at this depth a pixel of the shape is one of the image, also with an orthographic camera.
+        """
         centre = shape.mean(axis=1, keepdims=True)
         rest, Upsilon = self.B[:3] * self.radius, self.basis.Upsilon
         deformation = np.zeros((3, len(Upsilon)))
         for _ in range(FITTING_SWEEPS):
             R = nearest_rotation((shape - centre) @ (rest + deformation @ Upsilon).T)
             deformation = (R.T @ (shape - centre) - rest) @ Upsilon.T
-        s = self.camera.focal_px / centre[2, 0] if self.camera.perspective else 1.0
+        s = focal_px / centre[2, 0]
         t = s * centre[:2, 0] / self.radius
         return State(quaternion_from_rotation(R)[None], t[None], np.array([np.log(s)]), deformation[None] / self.unit)
 

@@ -7,15 +7,20 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import triangulate, unique_edges
-from reconstruction.basis.rest_shape import RestShape, RigidMotion
+from reconstruction.basis.model import Model
+from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import sheet
 from reconstruction.mapping.isometric.focal import focal, with_focal
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, select
 from reconstruction.mapping.solid.solid import bundle_adjust
+from reconstruction.state import State
 
 FEWEST_KEYFRAMES = 6
+FEWEST_POINTS = 20
+LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
+RIGID = 0.005  # residual over the size, up to which a solid is rigid enough to hold a focal length
 BESIDE = 4  # known points that say where an unknown one is
 
 
@@ -41,12 +46,24 @@ class Map:
     sheet: IsometricSheet | None = None
     unit_px: float = 1.0
 
-    def shape(self, W: Array, visible: Mask) -> Array | None:
-        """The sheet (3, p) in camera axes and pixels in another frame (2, p) px, by its lengths; None for a solid."""
-        if self.sheet is None:
+    def expected(self, model: Model, W: Array, visible: Mask, last: Array | None) -> State | None:
+        """Pose and Λ' of a sheet in another frame, by its lengths; None for a solid, or with too few points.
+
+        Args:
+            model: the modes of the rest shape.
+            W: (2, p) px; anything where not visible.
+            visible: (p,).
+            last: (3, p) the shape in the frame before, if there is one: the depth of an orthographic view has either sign.
+        """
+        if self.sheet is None or visible.sum() < FEWEST_POINTS:
             return None
         found = self.sheet.finish(np.where(visible, W, 0.0)[None], visible[None]).shapes()[0]
-        return self.unit_px * completed(found, self.rest.motion.shape)
+        shape = self.unit_px * completed(found, self.rest.motion.shape)
+        if last is not None and not self.camera.perspective:
+            depth = shape[2] - shape[2].mean()
+            if depth @ (last[2] - last[2].mean()) < 0:
+                shape[2] -= 2 * depth
+        return model.state_of(shape, self.sheet.camera.focal_px)
 
     def scaled(self, factor: float) -> "Map":
         """The same, so many times as large, and so many times as far away."""
@@ -67,16 +84,35 @@ def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool) -> Map
     if len(W) < FEWEST_KEYFRAMES:
         return None
     try:
-        evidence = select(W, visible, camera, lambda w, h, c: sheet(w, h, c).shapes())
+        evidence = select(W, visible, camera, lambda w, h, c: sheet(w, h, lens(c, w)).shapes())
         if evidence.kind == "sheet":
             return sheet_map(W, visible, camera, evidence, estimate_focal=estimate_focal)
         if evidence.kind == "solid":
-            found = bundle_adjust(W, visible, camera, refine_focal=estimate_focal)
-            rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
-            return Map(rest, found.camera, evidence, W, visible)
+            return solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal)
     except ReconstructionError:
         pass
     return None
+
+
+def lens(camera: Camera, W: Array) -> Camera:
+    """The camera, if it is in perspective, else a long lens that sees points (K, 2, p) px as it does."""
+    if camera.perspective:
+        return camera
+    size = float(np.nanmedian(np.sqrt(np.nanvar(W, axis=2).sum(axis=1))))
+    return Camera(LONG_LENS * size, np.nanmean(W, axis=(0, 2)))
+
+
+def solid_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool) -> Map:
+    """The map of a solid; one that deforms holds no focal length.
+
+    Raises:
+        ReconstructionError: there are too few points.
+    """
+    found = bundle_adjust(W, visible, camera, refine_focal=estimate_focal)
+    if estimate_focal and np.nanmedian(found.residual_px) > RIGID * rms_radius(found.shape):
+        found = bundle_adjust(W, visible, camera, refine_focal=False)
+    rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
+    return Map(rest, found.camera, evidence, W, visible)
 
 
 def sheet_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool) -> Map:
@@ -85,11 +121,12 @@ def sheet_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, es
     Raises:
         ReconstructionError: there are too few points.
     """
-    found = sheet(W, visible, camera)
-    if estimate_focal:
+    found = sheet(W, visible, lens(camera, W))
+    if estimate_focal and camera.perspective:
         search = focal(found)
         if search.known:
             found = with_focal(found, search.focal_px)
+            camera = found.camera
     shapes = found.shapes()
     known = np.isfinite(shapes).all(axis=(0, 1))
     middle = medoid(shapes[:, :, known])
@@ -104,7 +141,7 @@ def sheet_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, es
     s = found.camera.focal_px / (unit_px * origin[:, 2])
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, (s * unit_px)[:, None] * origin[:, :2])
     note = f"sheet from {len(W)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
-    return Map(RestShape("isometric", motion, note), found.camera, evidence, W, visible, found, unit_px)
+    return Map(RestShape("isometric", motion, note), camera, evidence, W, visible, found, unit_px)
 
 
 def medoid(shapes: Array) -> int:

@@ -107,7 +107,7 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     )
     solid, flat = (rigid_misfit(models, seen, camera, edges) for models in (solids, planes))
     sheet, change = Misfit(np.nan, np.nan), np.nan
-    if surface is not None and camera.perspective:
+    if surface is not None:
         with suppress(ReconstructionError):  # no sheet, then
             sheet, change = sheet_misfit([surface(w, h, camera) for w, h in seen], seen, edges)
     turn, relief = (float(np.mean([getattr(one, name) for one in solids])) for name in ("turn_degrees", "relief"))

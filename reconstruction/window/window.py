@@ -78,20 +78,19 @@ class SlidingWindow:
         self._refine = refine
         self._switch: Switch | None = None  # of the newest frame
 
-    def advance(self, W: Array, visible: Mask, expected: Array | None = None) -> ShapeEstimate:
+    def advance(self, W: Array, visible: Mask, expected: State | None = None) -> ShapeEstimate:
         """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape.
 
         Args:
             W: (2, p) px; anything where not visible.
             visible: (p,).
-            expected: (3, p) in camera axes and pixels, the shape by other knowledge; the frame starts there, and is
-                pulled there instead of to the rest shape.
+            expected: its pose and Λ' by other knowledge (n = 1): where it starts, and what it is pulled to.
         """
         if expected is not None:
-            return self._near(W, visible, self.model.state_of(expected))
+            return self._near(W, visible, expected)
         self.frames += 1
         self._switch = None
-        weights = start_weights(self._last_shape(), W, visible, self.model.radius)
+        weights = start_weights(self.last_shape(), W, visible, self.model.radius)
         self._data.append(image_statistics(self.model, W, weights))
         found = self._adjusted(self._started(W, weights))
         surprised = self._surprising(found)
@@ -130,7 +129,7 @@ class SlidingWindow:
         last = self.state[-1:]
         return self.model.projection(extrapolated(self.state[-2:-1], last) if len(self.state) > 1 else last).T
 
-    def _last_shape(self) -> Array:
+    def last_shape(self) -> Array:
         """The last frame's shape (3, p), px, its first two rows as seen by the camera."""
         if self.state is None:
             last = self._motion.R[0] @ self._motion.shape
