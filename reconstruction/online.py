@@ -16,8 +16,8 @@ from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping import focal, rest_shape
 from reconstruction.mapping.evidence import TURN_DEGREES, weigh
 from reconstruction.mapping.factorization import view_turn_degrees
-from reconstruction.mapping.map import Map, ratio_of_sizes
-from reconstruction.mapping.mapper import Mapper, Start, at_once
+from reconstruction.mapping.keyframes import Keyframes
+from reconstruction.mapping.map import Map, map_of, ratio_of_sizes
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.settings import Deformation, Metric, Settings
 from reconstruction.window import priors
@@ -44,7 +44,6 @@ class Reconstruction:
         settings: how to reconstruct.
         given: a rest shape (3, p) from elsewhere.
         mesh: its mesh, if it has one.
-        start: where maps are made meanwhile; they are in force after the same number of frames anywhere.
 
     Attributes:
         map: what the keyframes said the object is; None while the first frames' word stands.
@@ -57,12 +56,7 @@ class Reconstruction:
     """
 
     def __init__(
-        self,
-        camera: Camera,
-        settings: Settings,
-        given: RestShape | None = None,
-        mesh: Mesh | None = None,
-        start: Start = at_once,
+        self, camera: Camera, settings: Settings, given: RestShape | None = None, mesh: Mesh | None = None
     ) -> None:
         if settings.energy == "paper" and camera.perspective:
             raise ReconstructionError("energy paper needs an orthographic camera", "energy")
@@ -70,7 +64,8 @@ class Reconstruction:
         self.rest = given
         self.map: Map | None = None
         maps = given is None and settings.rest_shape == "auto" and settings.energy != "paper"
-        self._mapper = Mapper(start) if maps else None
+        self._keyframes = Keyframes() if maps else None
+        self._frame = -1
         self._mesh = mesh
         self.window: SlidingWindow | None = None
         self.bootstrap_frames = 0
@@ -115,8 +110,9 @@ class Reconstruction:
         Raises:
             ReconstructionError: no rest shape can be had from the frames so far.
         """
-        if self._mapper is not None:
-            self._replace(self._mapper.add(W, visible, self.camera, estimate_focal=self.settings.estimate_focal))
+        self._frame += 1
+        if self._keyframes is not None:
+            self._keyframes.offer(self._frame, W, visible)
         if self.window is not None:
             if self.map is None:
                 return [self.window.advance(W, visible)]
@@ -146,22 +142,21 @@ class Reconstruction:
         return self._decide(last=True) if self.window is None and self._waiting else []
 
     def revise(self) -> bool:
-        """Make a last map of all keyframes; whether there is one, so that all frames are worth another pass.
+        """What the object is by keyframes of all frames so far: replace the model, if they tell; whether they do.
 
-        The next frame to `update` is the first one again, then.
+        Then all frames are worth another pass: the next one to `update` is the first again.
         """
-        if self._mapper is None or self.window is None:
+        if self._keyframes is None or self.window is None:
             return False
-        mapper, self._mapper = self._mapper, None
-        return self._replace(mapper.finish(self.camera, estimate_focal=self.settings.estimate_focal))
-
-    def _replace(self, found: Map | None) -> bool:
-        """Put a map in force, if there is one, in the size of the model before it."""
-        if found is None or self.window is None:
+        W, visible, _ = self._keyframes.spread()
+        self._keyframes = None
+        found = map_of(W, visible, self.camera, estimate_focal=self.settings.estimate_focal)
+        if found is None:
             return False
-        self.map = found = found.scaled(ratio_of_sizes(self.window.model.basis.rest, found.rest.motion.shape))
-        self.camera, self.deformation = found.camera, self.settings.deformation
-        self.focal_note = f"focal length {found.camera.focal_px:.0f} px" if self.camera.perspective else ""
+        found = found.scaled(ratio_of_sizes(self.window.model.basis.rest, found.rest.motion.shape))
+        if self.settings.estimate_focal and found.camera.perspective:
+            self.focal_note = f"focal length {found.camera.focal_px:.0f} px, from {len(W)} keyframes"
+        self.map, self.camera, self.deformation = found, found.camera, self.settings.deformation
         self._build(found.rest)
         return True
 

@@ -41,7 +41,7 @@ class Output(Json, Overwrite):
 
 
 @dataclass(frozen=True)
-class Source(FinalPass):
+class Source:
     """What is reconstructed from: the options that `run` and `retexture` share."""
 
     source: tyro.conf.Positional[str]
@@ -80,18 +80,13 @@ class Source(FinalPass):
             raise UsageError(f"--opacity {self.opacity} is no opacity: give 0 to 1")
 
     @property
-    def stored(self) -> bool:
-        """Whether the source is a file: it ends, and nobody waits for it."""
-        return not (self.source.isdigit() or "://" in self.source)
-
-    @property
     def frame_range(self) -> tuple[int, int | None]:
         """First frame, and the one after the last or None."""
         return parse_range(self.frames)
 
 
 @dataclass(frozen=True)
-class Run(Source):
+class Run(FinalPass, Source):
     """Reconstruct a video, frame by frame, and record it.
 
     After a cut to a scene that the object is not in, another object is followed there, in a recording of its own
@@ -112,6 +107,12 @@ class Run(Source):
     """Picture (or video: its first) painted on the first object's mesh in recording and viewer; for a video of it:
     modeshape retexture."""
     output: tyro.conf.OmitArgPrefixes[Output] = Output()
+
+    @property
+    def passes(self) -> bool:
+        """Whether frames are kept for a final pass: those of a file, whose recording stays one file."""
+        live = self.source.isdigit() or "://" in self.source
+        return self.final_pass and not live and self.output.split_minutes is None
 
     @property
     def json(self) -> bool:

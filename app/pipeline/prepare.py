@@ -13,7 +13,6 @@ from app.files.mesh_file import rest_of_surface
 from app.options.model import Model
 from app.options.run import Run
 from reconstruction.camera import Camera
-from reconstruction.mapping.mapper import Start
 from reconstruction.online import Reconstruction
 from reconstruction.settings import RecoveredRestShape, Settings
 from tracking.features import detect_corners
@@ -23,8 +22,8 @@ from tracking.video import Frame
 RECOVERED = get_args(RecoveredRestShape)  # rest shapes that come from the first frames
 
 
-def prepared(config: Run, first: Frame, start: Start) -> tuple[Array, Reconstruction]:
-    """Corners (P, 2) px of the first frame, and the estimator before it has seen one, which makes its maps by `start`.
+def prepared(config: Run, first: Frame) -> tuple[Array, Reconstruction]:
+    """Corners (P, 2) px of the first frame, and the estimator before it has seen one.
 
     Raises:
         UsageError, TrackingError: a region, mask or mesh that does not fit the picture, or too few corners.
@@ -38,7 +37,7 @@ def prepared(config: Run, first: Frame, start: Start) -> tuple[Array, Reconstruc
     camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
     settings = settings_of(model, config.rest_shape, estimate_focal=not isinstance(model.focal, float))
     if config.rest_shape in RECOVERED:
-        return points_px, Reconstruction(camera, settings, start=start)
+        return points_px, Reconstruction(camera, settings)
     given, inside = rest_of_surface(Path(config.rest_shape), points_px, camera)
     return points_px[inside], Reconstruction(camera, settings, given)
 

@@ -12,6 +12,7 @@ from app.files.names import RECORDINGS, beside, free_name
 from app.files.writing import check_free
 from app.options.run import Run
 from app.pipeline.counts import Counts
+from app.pipeline.final_pass import final_pass
 from app.pipeline.interrupts import completed
 from app.pipeline.prefetch import Prefetch
 from app.pipeline.processed import InOrder, Processed, Surface
@@ -90,6 +91,7 @@ class Session:
             self._object = self._first_object = TrackedObject(config, first, self._watch)
             self._path = output.out or (free_name(RECORDINGS, config.source) if self._record_unnamed else None)
             needed = bool(self._path or output.connect or output.view)
+            self._wanted_again = needed or bool(output.shapes_out or config.ground_truth)
             prefetch = Prefetch(chain([second], source))
             with RecordingProcess(needed=needed) as self._recording, self._progress, prefetch as self._prefetch:
                 self._watch.start()
@@ -192,12 +194,10 @@ class Session:
         """Record the shapes that are left and the summary, and save the files asked for.
 
         Raises:
-            ReconstructionError: the last object has too few frames for a rest shape; if interrupted, it is only told.
+            ReconstructionError: the last object has too few frames for a rest shape, and nobody interrupted it.
         """
         try:
             self._record(self._object.finish())
-            if not self.interrupted:
-                self._revise()
         except ReconstructionError as error:
             if last and not self.interrupted:
                 raise
@@ -205,20 +205,15 @@ class Session:
         if last:
             self._order.end(self._surface)
             self._watch.stop()
+        if self._wanted_again and not self.interrupted:
+            self.interrupted = final_pass(self._object, self._recording, self._progress)
+        if last:
             self.summary = self._summary(self._first_object)
         self._recording.tell("summary", self._summary(self._object).as_dict())
         if self._surface is not None:  # its figure would have slowed the run
-            self._recording.tell("modes", self._surface.model.basis, self._surface.model.mesh, self._surface.metric)
+            model = self._object.reconstruction.model
+            self._recording.tell("modes", model.basis, model.mesh, self._object.surface.metric)
         self._object.save()
-        self._object.close()
-
-    def _revise(self) -> None:
-        """Record all frames once more, with what the object turned out to be."""
-        for count, shape in enumerate(self._object.revised()):
-            if count == 0:
-                self._begin_surface(shape.index, shape.time_s)
-            self._recording.tell("estimate", shape.index, shape.time_s, shape.estimate)
-            self._progress.advance("final pass", self._object.collected.last_rms_px)
 
     def _begin_another(self, frame: Frame) -> None:
         """From this frame on the successor is followed, in a recording of its own."""

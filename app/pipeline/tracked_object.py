@@ -11,7 +11,6 @@ from app.options.run import Run, configuration
 from app.painting.compositing import Placement, painted
 from app.painting.picture import first_picture
 from app.pipeline.estimates import Collected, Scores, save_shapes
-from app.pipeline.map_process import MapProcess
 from app.pipeline.prepare import prepared
 from app.pipeline.processed import Surface
 from app.pipeline.stopwatch import Stopwatch
@@ -60,13 +59,11 @@ class TrackedObject:
         self.collected = self._nothing()
         self.online: Collected | None = None
         self._texture = first_picture(config.texture) if config.texture else None
-        self._maps = MapProcess()
-        self.points_px, self.reconstruction = prepared(config, first, self._maps.start)
+        self.points_px, self.reconstruction = prepared(config, first)
         self._tracker = GuardedTracker(first.image, self.points_px)
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
-        passes = config.final_pass and config.stored and config.output.split_minutes is None
-        self._stored = StoredTracks(len(self.points_px)) if passes or config.output.tracks_out else None
-        self._passes = passes
+        stored = config.passes or config.output.tracks_out
+        self._stored = StoredTracks(len(self.points_px)) if stored else None
 
     @property
     def lost(self) -> bool:
@@ -153,9 +150,8 @@ class TrackedObject:
 
     def revised(self) -> Iterator[FrameShape]:
         """The shapes of all frames once more, with a last map; none where that tells nothing new."""
-        with self._watch.time("reconstruct"):
-            if not self._passes or not self.reconstruction.revise():
-                return
+        if not self.config.passes or not self.reconstruction.revise():
+            return
         assert self._stored is not None
         self.online, self.collected = self.collected, self._nothing()
         lost = False
@@ -168,14 +164,8 @@ class TrackedObject:
                 self.reconstruction.restart()
                 lost = False
             self._times[stored.index] = stored.time_s
-            with self._watch.time("reconstruct"):
-                seen = stored.observation
-                shapes = self._of_frames(self.reconstruction.update(seen.points_px.T, seen.visible))
-            yield from shapes
-
-    def close(self) -> None:
-        """End what works for it elsewhere."""
-        self._maps.close()
+            seen = stored.observation
+            yield from self._of_frames(self.reconstruction.update(seen.points_px.T, seen.visible))
 
     def score(self, collected: Collected | None) -> Scores | None:
         """Errors of estimates against the truth; None without one, or before there is a shape."""

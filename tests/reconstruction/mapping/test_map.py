@@ -1,0 +1,112 @@
+"""What an object is by its keyframes: kind, rest shape, camera, and shapes of other frames, in any unit and camera."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from reconstruction.basis.model import build_model
+from reconstruction.camera import Camera
+from reconstruction.evaluation import e3d
+from reconstruction.mapping.map import Map, completed, map_of, medoid, ratio_of_sizes
+from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
+
+FRAMES, POINTS = 24, 150
+
+
+@cache
+def waving() -> tuple[np.ndarray, np.ndarray, Map]:
+    W, S = waving_sheet(np.random.default_rng(5), FRAMES)
+    found = map_of(W[::2], np.ones((FRAMES // 2, POINTS), bool), CAMERA, estimate_focal=False)
+    assert found is not None
+    return W, S, found
+
+
+def expected_error(found: Map, W: np.ndarray, truth: np.ndarray) -> float:
+    """Of the shapes of all frames, as the modes of the rest shape hold them."""
+    model = build_model(found.rest, found.camera, 20)
+    shapes = []
+    for w in W:
+        state = found.expected(model, w, np.ones(POINTS, bool), shapes[-1] if shapes else None)
+        assert state is not None
+        shapes.append(model.estimate(0, w, np.ones(POINTS, bool), state).shape)
+    return float(e3d(np.stack(shapes), truth).mean())
+
+
+def test_a_sheet_that_is_never_flat() -> None:
+    W, S, found = waving()
+    assert found.rest.kind == "isometric"
+    assert expected_error(found, W[1::2], S[1::2]) < 0.05
+    R, s, t = found.rest.motion.R, found.rest.motion.s, found.rest.motion.t
+    posed = s[:, None, None] * R @ found.rest.motion.shape
+    image = (posed[:, :2] + t[:, :, None]) / (1 + posed[:, 2:] / CAMERA.focal_px) + CAMERA.center_px[:, None]
+    assert np.median(np.abs(image - W[::2])) < 0.05 * np.ptp(W)
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e3])
+def test_units_do_not_matter(unit: float) -> None:
+    W, S, found = waving()
+    camera = Camera(CAMERA.focal_px * unit, CAMERA.center_px * unit)
+    again = map_of(W[::2] * unit, np.ones((FRAMES // 2, POINTS), bool), camera, estimate_focal=False)
+    assert again is not None
+    np.testing.assert_allclose(again.rest.motion.shape, found.rest.motion.shape * unit, rtol=1e-4, atol=1e-4 * unit)
+
+
+def test_a_sheet_before_an_orthographic_camera() -> None:
+    _, S, _ = waving()
+    W = 300 * (S - S.mean(axis=2, keepdims=True))[:, :2] + np.array([320.0, 240.0])[:, None]
+    W = W + np.random.default_rng(0).normal(0, 0.1, W.shape)
+    found = map_of(W, np.ones((FRAMES, POINTS), bool), ORTHOGRAPHIC, estimate_focal=False)
+    assert found is not None
+    assert found.rest.kind == "isometric"
+    assert not found.camera.perspective
+    mirrored = S * np.array([1.0, 1.0, -1.0])[:, None]
+    assert min(expected_error(found, W, S), expected_error(found, W, mirrored)) < 0.12
+
+
+def test_a_solid() -> None:
+    rng = np.random.default_rng(3)
+    rest = relief(rng, 120)
+    W, placed = seen(np.repeat(rest[None], 16, axis=0), turns(16, 30.0), PERSPECTIVE)
+    W = W + rng.normal(0, 0.1, W.shape)
+    found = map_of(W, np.ones((16, 120), bool), PERSPECTIVE, estimate_focal=False)
+    assert found is not None
+    assert found.rest.kind == "rigid"
+    assert e3d(found.rest.motion.shape[None], placed[:1])[0] < 0.03
+    model = build_model(found.rest, found.camera, 10)
+    assert found.expected(model, W[0], np.ones(120, bool), None) is None
+
+
+def test_a_map_in_another_size_is_the_same_picture() -> None:
+    W, _, found = waving()
+    larger = found.scaled(3.0)
+    assert ratio_of_sizes(larger.rest.motion.shape, found.rest.motion.shape) == pytest.approx(3.0)
+    images = []
+    for one in (found, larger):
+        model = build_model(one.rest, one.camera, 20)
+        state = one.expected(model, W[1], np.ones(POINTS, bool), None)
+        assert state is not None
+        images.append(model.projection(state))
+    np.testing.assert_allclose(images[0], images[1], atol=1e-3)
+
+
+def test_too_few_keyframes_tell_nothing() -> None:
+    W, _, _ = waving()
+    assert map_of(W[:5], np.ones((5, POINTS), bool), CAMERA, estimate_focal=False) is None
+
+
+def test_the_medoid_is_nearest_to_all() -> None:
+    rng = np.random.default_rng(1)
+    shape = rng.normal(size=(3, 30))
+    shapes = np.stack([shape + k * rng.normal(size=(3, 30)) for k in (0.5, 0.5, 0.0, 0.5)])
+    assert medoid(shapes) == 2
+
+
+def test_unknown_points_are_where_their_neighbours_are() -> None:
+    shape = np.array([[0.0, 1.0, np.nan, 5.0, 1.0], [0.0, 0.0, np.nan, 5.0, 1.0], [0.0, 0.0, np.nan, 5.0, 0.0]])
+    like = np.array([[0.0, 1.0, 0.5, 9.0, 1.0], [0.0, 0.0, 0.5, 9.0, 1.0], [0.0, 0.0, 0.0, 9.0, 0.0]])
+    whole = completed(shape, like)
+    assert np.isfinite(whole).all()
+    np.testing.assert_array_equal(whole[:, [0, 1, 3, 4]], shape[:, [0, 1, 3, 4]])
+    assert completed(whole, like) is whole
