@@ -148,16 +148,17 @@ class Reconstruction:
         """
         if self._keyframes is None or self.window is None:
             return False
-        W, visible, _ = self._keyframes.spread()
+        W, visible, frames = self._keyframes.spread()
         self._keyframes = None
         found = map_of(W, visible, self.camera, estimate_focal=self.settings.estimate_focal)
         if found is None:
             return False
         found = found.scaled(ratio_of_sizes(self.window.model.basis.rest, found.rest.motion.shape))
+        rest = replace(found.rest, motion=found.rest.motion.in_order(np.argsort(frames)))
         if self.settings.estimate_focal and found.camera.perspective:
             self.focal_note = f"focal length {found.camera.focal_px:.0f} px, from {len(W)} keyframes"
         self.map, self.camera, self.deformation = found, found.camera, self.settings.deformation
-        self._build(found.rest)
+        self._build(rest)
         return True
 
     def _decide(self, last: bool) -> list[ShapeEstimate]:

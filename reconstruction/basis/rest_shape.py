@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from reconstruction.arrays import Array
+from reconstruction.arrays import Array, Indices
 
 Kind = Literal["rigid", "plane", "isometric", "mesh", "truth"]
 
@@ -31,6 +31,10 @@ class RigidMotion:
     def in_first_frame(self) -> "RigidMotion":
         """The same in camera axes and pixels of the first frame: R[0] = 1, s[0] = 1."""
         return replace(self, shape=self.s[0] * self.R[0] @ self.shape, R=self.R @ self.R[0].T, s=self.s / self.s[0])
+
+    def in_order(self, frames: Indices) -> "RigidMotion":
+        """The same with the frames (F,) in another order."""
+        return replace(self, R=self.R[frames], s=self.s[frames], t=self.t[frames])
 
     def mirrored(self) -> "RigidMotion":
         """Depth reversed: explains orthographic views as well."""
