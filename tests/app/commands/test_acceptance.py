@@ -55,6 +55,39 @@ def test_evaluate(modeshape: Command, shared_data: Path, arguments: tuple[object
 
 
 @pytest.mark.parametrize(
+    ("file", "bound"),
+    [
+        ("flag250.npz", 0.039),
+        ("flag250_perspective.npz", 0.019),
+        ("waving_3.npz", 0.0125),
+        ("waving_5.npz", 0.017),
+        pytest.param("waving_7.npz", 0.026, marks=pytest.mark.slow),
+        pytest.param("waving_9.npz", 0.04, marks=pytest.mark.slow),
+    ],
+)
+def test_sheets_that_are_never_flat(modeshape: Command, shared_data: Path, file: str, bound: float) -> None:
+    outcome = modeshape("evaluate", shared_data / file, "--json")
+    assert outcome.code == 0, outcome.err
+    words = json.loads(outcome.out)
+    assert words["rest_shape"] == "isometric"
+    assert words["e3d"] <= bound
+    assert words["e3d_online"] > words["e3d"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("frames", "bound"), [("16:113", 0.02), ("40:113", 0.0205), ("60:113", 0.027)])
+def test_a_printed_sheet_from_any_start(modeshape: Command, shared_data: Path, frames: str, bound: float) -> None:
+    outcome = modeshape(
+        "run", shared_data / "kinect_paper.mp4", *KINECT[:-1], frames, "--json", "--out", "paper.rrd",
+        "--ground-truth", shared_data / "kinect_paper_gt.npz",
+    )  # fmt: skip
+    assert outcome.code == 0, outcome.err
+    words = json.loads(outcome.out)
+    assert words["e3d"] <= bound
+    assert words["focal_px"] == pytest.approx(528, rel=0.03)
+
+
+@pytest.mark.parametrize(
     ("option", "share", "factor"),
     [
         ("--missing", 0.2, 1.1),
@@ -97,7 +130,7 @@ def test_more_modes_explain_more(modeshape: Command, shared_data: Path) -> None:
     assert all(b < a + 0.001 for a, b in itertools.pairwise(errors))
 
 
-@pytest.mark.parametrize(("focal", "bound"), [((), 0.038), (("--focal", 528), 0.030)], ids=["found", "true"])
+@pytest.mark.parametrize(("focal", "bound"), [((), 0.0195), (("--focal", 528), 0.0195)], ids=["found", "true"])
 def test_a_printed_sheet_is_followed(
     modeshape: Command, shared_data: Path, here: Path, focal: tuple[object, ...], bound: float
 ) -> None:
@@ -113,7 +146,9 @@ def test_a_printed_sheet_is_followed(
         assert tracks["visible"][112].mean() >= 0.6
     assert words["reprojection_rms_px"] <= 2
     assert words["e3d"] <= bound
-    assert words["e3d_static"] == pytest.approx(0.11, abs=0.015)
+    assert words["e3d"] < words["e3d_online"] < 0.03
+    assert words["e3d_static"] > 0.1
+    assert words["focal_px"] == pytest.approx(528, rel=0.03)
     assert words["truth_points"] >= 250
     assert words["truth_frames"] == 14
     verify(here / "paper.rrd")
