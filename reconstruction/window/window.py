@@ -77,7 +77,7 @@ class SlidingWindow:
         self._switch: Switch | None = None  # of the newest frame
 
     def advance(self, W: Array, visible: Mask) -> ShapeEstimate:
-        """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape."""
+        """Add the next frame's points (2, p) px and adjust the window; returns the newest frame's shape."""
         self._frame += 1
         self._switch = None
         weights = start_weights(self._last_shape(), W, visible, self.model.radius)

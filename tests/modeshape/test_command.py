@@ -2,6 +2,7 @@
 
 import json
 import os
+import sys
 from pathlib import Path
 
 import cv2
@@ -42,7 +43,10 @@ def test_run_retexture_and_batch_beside_foreign_modules(folder: Path, video: Pat
 
 
 @pytest.mark.slow
-def test_bench_beside_foreign_modules(folder: Path) -> None:
+def test_bench_beside_foreign_modules(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(command_line.ENVIRONMENT, "PYTHONPATH")  # an empty entry of it is the current folder
+    command = (Path(sys.executable).with_name("modeshape"),)
+    monkeypatch.setattr(command_line, "PROGRAM", command)
     done = in_own_process(folder, "bench", "--quick", "--json")
     assert done.code == 0, done.err
 
