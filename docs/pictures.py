@@ -12,7 +12,7 @@ from app.painting.compositing import Compositor
 from app.painting.picture import premultiplied
 from app.playback.playback import Playback
 from tests.viewer.conftest import Viewer, headless_viewer
-from tests.viewer.screenshot import settled
+from tests.viewer.screenshot import steady
 
 Image = NDArray[np.uint8]
 
@@ -62,7 +62,7 @@ def photographed(viewer: Viewer, recording: Path, frame: int) -> Image:
     while not viewer.client.get_state().recordings or viewer.client.get_state().loading:
         time.sleep(0.2)
     viewer.client.set_time("frame", sequence=frame, play_state="paused")
-    return settled(viewer)[TITLE_BAR_PX:]
+    return steady(viewer)[TITLE_BAR_PX:]
 
 
 def save(name: str, image: Image) -> None:

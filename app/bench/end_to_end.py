@@ -1,7 +1,6 @@
 """Part 3 to 5: whole runs beside the bare OpenCV loop, their start, their frame times and their memory."""
 
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -136,11 +135,9 @@ def help_s(log: Log) -> float:
 
 
 def child(module: str, *arguments: str) -> dict[str, float]:
-    """What a module of ours, run by itself, prints as JSON."""
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])}
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", module, *arguments], env=environment, stdout=subprocess.PIPE, check=True, text=True
-    )
+    """What a module of ours, run by itself, prints as JSON; nothing is imported from the current folder."""
+    command = [sys.executable, "-P", "-m", module, *arguments]
+    done = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True)
     words: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
     return words
 

@@ -75,7 +75,7 @@ def timings(*, quick: bool, log: Log) -> list[Timing]:
 
 def iterations(step: WindowStep) -> Callable[[], Solution]:
     """Four iterations of a step whose points are summed up."""
-    data = stack([step.settled, summed(step.B, step.W[-1], step.focal)])
+    data = stack([step.earlier, summed(step.B, step.W[-1], step.focal)])
     return lambda: minimise(
         step.energy, data, step.start, Previous(step.before), Solver(iterations=ITERATIONS, tolerance=0.0)
     )
@@ -102,7 +102,7 @@ def timed(step: WindowStep, deformation: str, iterations_s: float) -> Timing:
 
 def solved(step: WindowStep, solver: Solver) -> Solution:
     """What a run does for a new frame."""
-    data = stack([step.settled, summed(step.B, step.W[-1], step.focal)])
+    data = stack([step.earlier, summed(step.B, step.W[-1], step.focal)])
     return minimise(step.energy, data, step.start, Previous(step.before), solver)
 
 

@@ -42,7 +42,7 @@ class Collected:
     switches: int = 0
 
     def add(self, frame: int, estimate: ShapeEstimate) -> None:
-        """Take one estimate of a source frame."""
+        """Add the estimate of a source frame."""
         seen = estimate.residual_px[estimate.visible]
         squared = float(seen @ seen)
         self.last_rms_px = float(np.sqrt(squared / len(seen))) if len(seen) else None
@@ -53,7 +53,7 @@ class Collected:
             self.estimates[frame] = estimate
 
     def lose(self, frame: int) -> None:
-        """Take notice of a source frame in which the object is lost."""
+        """Note a source frame in which the object is lost."""
         if self.everything:
             self.lost.append(frame)
 

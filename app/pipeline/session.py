@@ -59,11 +59,7 @@ class Session:
         self.fps, self.interrupted = 0.0, False
 
     def run(self) -> RunSummary:
-        """Process the whole source; an interrupt ends it early, with everything so far kept.
-
-        Raises:
-            UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
-        """
+        """Process the whole source; an interrupt ends it early, with everything so far kept. Raises what `frames` raises."""
         self._order.wanted = False
         deque(self.frames(), maxlen=0)
         return self.summary

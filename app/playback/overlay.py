@@ -122,17 +122,17 @@ class Canvas:
         base = self.image.shape[0] - round(9 * unit)
         x = round(12 * unit)
 
-        def say(text: str) -> None:
+        def write(text: str) -> None:
             nonlocal x
             cv2.putText(self.image, text, (x, base), FONT, size, (235, 235, 235), max(1, round(unit)), cv2.LINE_AA)
             x += cv2.getTextSize(text, FONT, size, max(1, round(unit)))[0][0]
 
-        say(title)
+        write(title)
         for name, count, color in counts:
             x += round(26 * unit)
             cv2.circle(self.image, (x, base - round(5 * unit)), round(4 * unit), color[::-1], cv2.FILLED, cv2.LINE_AA)
             x += round(10 * unit)
-            say(f"{name} {count}")
+            write(f"{name} {count}")
 
     def _fixed(self, places: Array) -> NDArray[np.int32]:
         """Places in the enlarged picture as OpenCV's fixed-point numbers; pixel centres are whole numbers in both."""

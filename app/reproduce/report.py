@@ -62,7 +62,7 @@ class Report:
         return self.folder / "report.md"
 
     def add(self, experiment: Experiment, result: Result, seconds: float, *, quick: bool) -> None:
-        """Take one experiment and write everything."""
+        """Add one experiment, and write everything."""
         earlier = self.experiments.get(experiment.name, {})
         for folder, pictures in ((FIGURES, result.figures), (FOOTAGE, result.footage)):
             for name in set(earlier.get(folder, [])) - set(pictures):

@@ -20,7 +20,7 @@ FOCAL_PX = 640.0
 NOISE_PX = 0.3
 WINDOW = 5
 MODES = 30  # the most; problems with fewer take the first
-SETTLED = Solver(iterations=100, tolerance=1e-7)  # how well the frames before the newest are known
+CONVERGED = Solver(iterations=100, tolerance=1e-7)  # how well the frames before the newest are known
 
 
 def surface(p: int, seed: int = 0) -> Array:
@@ -47,14 +47,14 @@ def full_model(p: int) -> Model:
 
 @dataclass(frozen=True)
 class WindowStep:
-    """One new frame for a window that is settled: what the solver and its rivals start from.
+    """One new frame for a window that is solved: what the solver and its rivals start from.
 
     Attributes:
         energy: what is minimised.
         B: (4 + r, p) basis, units of the rest shape.
         focal: focal length in the same units.
         W: (n, 2, p) what the frames show, the newest last, in the same units.
-        settled: sums of all frames but the newest.
+        earlier: sums of all frames but the newest.
         start: the window as found so far, the newest frame like the one before.
         before: the frame that has left the window.
     """
@@ -63,7 +63,7 @@ class WindowStep:
     B: Array
     focal: float
     W: Array
-    settled: Statistics
+    earlier: Statistics
     start: State
     before: State
 
@@ -92,7 +92,7 @@ def window_step(model: Model, r: int, deformation: str) -> WindowStep:
     W += NOISE_PX / model.radius * rng.normal(size=W.shape)
     data = [summed(B, w, model.focal) for w in W]
     first = State(true_motion(1, r, ()).q, np.zeros((1, 2)), np.zeros(1), np.zeros((1, 3, r)))
-    state = minimise(energy, stack(data[:-1]), join([first] * (WINDOW + 1)), None, SETTLED).state
+    state = minimise(energy, stack(data[:-1]), join([first] * (WINDOW + 1)), None, CONVERGED).state
     start = join([state[2:], state[-1:]])
     return WindowStep(energy, B, model.focal, W[2:], stack(data[2:-1]), start, state[1:2])
 

@@ -16,7 +16,7 @@ GROSS_SIGMAS = 6.0  # deviations beyond which an entry may be an outlier
 DISAGREEING_SIGMAS = 4.0  # deviations beyond which an entry speaks against a place, how far ever it is off
 NEIGHBOURS = 8  # of a point: a part of the surface that moves by itself takes them along
 FLAT_SWEEPS, SOLID_SWEEPS, CLOSE_SWEEPS = 8, 12, 8
-SETTLED = 1e-3  # change of all deviations after which no further sweep is needed
+CONVERGED = 1e-3  # change of all deviations after which no further sweep is needed
 MANY_FAR = 0.3  # of a point's entries
 FAR_OUT = 12.0  # squared distance from the middle, in variances of a coordinate
 PAIRED_FRAMES = 10  # of a point, at most, that are tried two by two
@@ -74,7 +74,7 @@ class RobustFit:
             S = self._points(A, t, h)
             self._judge(self._known - A @ S - t)
             self._S = standardised(S)
-            if abs(self._off.sum() - before) < SETTLED * before:
+            if abs(self._off.sum() - before) < CONVERGED * before:
                 break
 
     def deepen(self) -> None:

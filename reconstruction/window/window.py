@@ -79,7 +79,7 @@ class SlidingWindow:
         self._switch: Switch | None = None  # of the newest frame
 
     def advance(self, W: Array, visible: Mask, expected: State | None = None) -> ShapeEstimate:
-        """Take the next frame's points (2, p) px and adjust the window; returns the newest frame's shape.
+        """Add the next frame's points (2, p) px and adjust the window; returns the newest frame's shape.
 
         Args:
             W: (2, p) px; anything where not visible.

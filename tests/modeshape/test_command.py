@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import pytest
 
+from app.bench.end_to_end import run_apart
 from tests.app import command_line
 from tests.app.command_line import in_own_process, still, turning, write_video
 from tests.synthetic_run import verify
@@ -41,10 +42,10 @@ def test_run_retexture_and_batch_beside_foreign_modules(folder: Path, video: Pat
     assert json.loads(done.out)["failed"] == 0
 
 
-@pytest.mark.slow
-def test_bench_beside_foreign_modules(folder: Path) -> None:
-    done = in_own_process(folder, "bench", "--quick", "--json")
-    assert done.code == 0, done.err
+def test_benchmarks_beside_foreign_modules(folder: Path, video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    assert run_apart(video, (0, 0, 320, 240), 60, 10)["points"] > 0
 
 
 def test_python_path_with_the_current_folder(folder: Path, video: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -67,17 +67,6 @@ def test_a_killed_run_can_be_reviewed(endless: Path, tmp_path: Path, seed: int) 
     assert playback.summary is None
 
 
-@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGTERM], ids=lambda which: which.name)
-def test_an_interrupted_recording_verifies(endless: Path, tmp_path: Path, which: signal.Signals) -> None:
-    process = start(endless, tmp_path)
-    begun(process, tmp_path / "run.rrd")
-    process.send_signal(which)
-    out, err = process.communicate(timeout=30)
-    assert process.returncode == 130, err
-    assert json.loads(out)["interrupted"] is True
-    verify(tmp_path / "run.rrd")
-
-
 def test_a_run_is_written_while_it_goes(endless: Path, tmp_path: Path) -> None:
     process = start(endless, tmp_path)
     recording = tmp_path / "run.rrd"

@@ -15,10 +15,10 @@ def shot(viewer: Viewer, name: str, frame: int) -> NDArray[np.uint8]:
     """(h, w, 3) BGR picture of the view whose name starts like this, at a frame."""
     viewer.client.set_time("frame", sequence=frame, play_state="paused")
     [view] = [view for view in viewer.client.get_state().views if view.name.startswith(name)]
-    return settled(viewer, view.view_id)
+    return steady(viewer, view.view_id)
 
 
-def settled(viewer: Viewer, view_id: str | None = None) -> NDArray[np.uint8]:
+def steady(viewer: Viewer, view_id: str | None = None) -> NDArray[np.uint8]:
     """(h, w, 3) BGR picture of a view, or of the whole window, once two are equal."""
     viewer.client.take_screenshot(view_id)  # the first one may be of a half-loaded scene
     picture, before = b"", b"-"

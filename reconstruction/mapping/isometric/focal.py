@@ -1,12 +1,11 @@
-"""Whether a sheet can be trusted: its two halves, and the focal length under which it keeps its lengths best."""
+"""The focal length under which a sheet keeps its lengths best."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from reconstruction.arrays import Array
-from reconstruction.evaluation import e3d
-from reconstruction.mapping.isometric.adjustment import SOLVER, adjust, again
+from reconstruction.mapping.isometric.adjustment import SOLVER, again
 from reconstruction.mapping.isometric.lengths import mean_log_lengths
 from reconstruction.mapping.isometric.nodes import edges_between
 from reconstruction.mapping.isometric.sheet import IsometricSheet
@@ -31,17 +30,6 @@ class FocalSearch:
     known: bool
     tried_px: Array
     strain_rms: Array
-
-
-def halves_disagreement(sheet: IsometricSheet) -> Array:
-    """Relative difference (F,) in each keyframe of the shapes that the lengths of two disjoint halves give.
-
-    All keyframes are finished with either half's lengths. Needs 6 keyframes.
-    """
-    warps, half = sheet.warps, np.arange(len(sheet.coefficients))
-    a, b = (adjust(warps.frames(half[k::2]), sheet.camera, rounds=2).in_frames(warps).shapes() for k in (0, 1))
-    known = sheet.warps.kept
-    return e3d(a[:, :, known], b[:, :, known])
 
 
 def with_focal(sheet: IsometricSheet, focal_px: float) -> IsometricSheet:

@@ -21,6 +21,7 @@ EVALUATE_KEYS = {
     *("e3d", "e3d_camera", "e3d_static", "e3d_sign_free"),
     *("frames", "points", "modes", "reprojection_rms", "ms_per_frame"),
 }
+QUICK = ("--points", "120", "--rest-shape", "plane", "--bootstrap-frames", "5", "--modes", "6", "--focal", "320")
 STAGES = {"decode", "track", "reconstruct", "record"}
 
 
@@ -90,7 +91,9 @@ def test_saved_tracks_can_be_evaluated(modeshape: Command, videos: Path) -> None
 
 def test_recordings_are_numbered(modeshape: Command, videos: Path) -> None:
     arguments = ("run", videos / "turning.mp4", "--frames", ":4", "--image", "none", "--json")
-    for name in ("turning.rrd", "turning-2.rrd", "turning-3.rrd"):
+    Path("recordings").mkdir()
+    Path("recordings", "turning-2.rrd").touch()
+    for name in ("turning.rrd", "turning-3.rrd"):
         assert json.loads(modeshape(*arguments).out)["recording"] == f"recordings/{name}"
         verify(Path("recordings", name))
 
@@ -104,7 +107,7 @@ def test_a_table_without_json(modeshape: Command, videos: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["plane", "rigid", "mesh"])
-@pytest.mark.parametrize("camera", ["perspective", "orthographic"])
+@pytest.mark.parametrize("camera", ["perspective", pytest.param("orthographic", marks=pytest.mark.slow)])
 def test_every_rest_shape_and_camera(modeshape: Command, videos: Path, here: Path, kind: str, camera: str) -> None:
     corners = [(20, 20), (300, 20), (20, 220), (300, 220)]
     (here / "sheet.obj").write_text("".join(f"v {x} {y} 0\n" for x, y in corners) + "f 1 2 3\nf 2 4 3\n")
@@ -120,7 +123,7 @@ def test_every_rest_shape_and_camera(modeshape: Command, videos: Path, here: Pat
 
 
 @pytest.mark.parametrize("deformation", ["bending", "stretching", "general", "inextensible"])
-@pytest.mark.parametrize("metric", ["euclidean", "manhattan"])
+@pytest.mark.parametrize("metric", ["euclidean", pytest.param("manhattan", marks=pytest.mark.slow)])
 def test_every_deformation_and_metric(modeshape: Command, videos: Path, deformation: str, metric: str) -> None:
     outcome = modeshape(
         "run", videos / "turning.mp4", "--image", "none", "--json", "--frames", ":12", "--points", 120, "--window", 3,
@@ -174,7 +177,7 @@ def long_video(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_an_interrupt_keeps_everything_so_far(long_video: Path, tmp_path: Path, which: signal.Signals) -> None:
     files = ("--tracks-out", "tracks.npz", "--shapes-out", "shapes.npz", "--out", "run.rrd")
     process = subprocess.Popen(
-        [*PROGRAM, "run", str(long_video), "--json", *files],
+        [*PROGRAM, "run", str(long_video), "--json", *QUICK, *files],
         cwd=tmp_path,
         env=ENVIRONMENT,
         stdout=subprocess.PIPE,
@@ -204,7 +207,7 @@ def test_an_interrupt_keeps_everything_so_far(long_video: Path, tmp_path: Path, 
 
 def test_an_interrupted_run_prints_its_table(long_video: Path, tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [*PROGRAM, "run", str(long_video), "--out", "run.rrd"],
+        [*PROGRAM, "run", str(long_video), *QUICK, "--out", "run.rrd"],
         cwd=tmp_path,
         env=ENVIRONMENT,
         stdout=subprocess.PIPE,

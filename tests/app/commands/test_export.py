@@ -152,8 +152,11 @@ def test_the_command_line(modeshape: Command, tmp_path: Path, run: Run) -> None:
 
 @pytest.mark.parametrize(
     ("video", "roi"),
-    [("kinect_paper.mp4", (195, 95, 325, 265)), ("talking_face.mp4", (115, 70, 130, 160)), (None, None)],
-    ids=["paper", "face", "demo"],
+    [
+        pytest.param("kinect_paper.mp4", (195, 95, 325, 265), id="paper", marks=pytest.mark.slow),
+        pytest.param("talking_face.mp4", (115, 70, 130, 160), id="face", marks=pytest.mark.slow),
+        pytest.param(None, None, id="demo"),
+    ],
 )
 def test_a_real_run_agrees_with_its_own_shapes(
     modeshape: Command, tmp_path: Path, request: pytest.FixtureRequest, video: str | None, roi: tuple[int, ...] | None

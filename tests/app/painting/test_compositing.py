@@ -181,12 +181,12 @@ def test_points_that_are_seen_carry_the_surface() -> None:
     work = compositor()
     seen = POINTS + np.array((1.5, -1.0))
     some = np.random.default_rng(0).random(len(POINTS)) < 0.6
-    settled = work.corrected(POINTS, np.where(some[:, None], seen, np.nan), some)
-    assert np.abs(settled - seen).max() < 0.1
+    corrected = work.corrected(POINTS, np.where(some[:, None], seen, np.nan), some)
+    assert np.abs(corrected - seen).max() < 0.1
     wild = seen.copy()
     wild[70] += 30
-    settled = work.corrected(POINTS, wild, np.ones(len(POINTS), bool))
-    assert np.linalg.norm(settled[70] - seen[70]) < 1
+    corrected = work.corrected(POINTS, wild, np.ones(len(POINTS), bool))
+    assert np.linalg.norm(corrected[70] - seen[70]) < 1
 
 
 def test_a_surface_out_of_view_leaves_the_frame_alone() -> None:

@@ -158,7 +158,7 @@ def test_one_that_gives_no_rest_shape_costs_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("impatient")
-def test_an_object_lost_before_it_has_a_model_settles_for_what_there_was(tmp_path: Path) -> None:
+def test_an_object_lost_early_has_the_model_of_the_frames_there_were(tmp_path: Path) -> None:
     words = run(scenes(tmp_path / "v.mp4", turning(8), another(50)), bootstrap_frames=10)
     assert (words["objects"], words["bootstrap_frames"]) == (2, 8)
     assert Playback.load(Path("run.rrd")).shaped.sum() == 8
@@ -183,8 +183,8 @@ def test_a_picture_stays_on_the_object_it_was_put_on(two_scenes: Path) -> None:
     command = Retexture(
         source=str(two_scenes), texture=Path("red.png"), out=Path("o.mp4"), points=100, rest_shape="plane", model=model
     )
-    words = retexture(command, Progress())
-    assert (words["objects"], words["painted_frames"]) == (2, CUT)
+    painted = retexture(command, Progress())
+    assert (painted.on.as_dict()["objects"], painted.painted_frames) == (2, CUT)
     with Video("o.mp4") as video:
         assert sum(1 for _ in video) == FRAMES
 

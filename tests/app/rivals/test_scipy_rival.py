@@ -18,7 +18,7 @@ from reconstruction.window.terms import evaluate
 @pytest.mark.parametrize("deformation", window.DEFORMATIONS)
 def test_scipy_minimises_the_energy_of_the_solver(deformation: str) -> None:
     step = window_step(full_model(60), 5, deformation)
-    data = stack([step.settled, summed(step.B, step.W[-1], step.focal)])
+    data = stack([step.earlier, summed(step.B, step.W[-1], step.focal)])
     scipy = ScipyWindow(step)
     x = np.concatenate([np.zeros((problems.WINDOW, 3)), parameters(step.start, step.energy.rows)[:, 4:]], axis=1).ravel()
     ours = evaluate(step.energy, data, step.start, Previous(step.before)).sum()

@@ -46,7 +46,7 @@ def test_a_sheet_that_is_never_flat() -> None:
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
 def test_units_do_not_matter(unit: float) -> None:
-    W, S, found = waving()
+    W, _, found = waving()
     camera = Camera(CAMERA.focal_px * unit, CAMERA.center_px * unit)
     again = map_of(W[::2] * unit, np.ones((FRAMES // 2, POINTS), bool), camera, estimate_focal=False)
     assert again is not None

@@ -53,7 +53,7 @@ def test_a_sheet_that_rolls_is_a_sheet(rng):
     W, visible, placed = keyframes(rng, shapes)
     evidence = select(W, visible, PERSPECTIVE, surface_of(W, placed, rng))
     assert evidence.kind == "sheet"
-    assert evidence.length_change < 0.01
+    assert evidence.length_change < 0.03  # of edges some 20 px long, with 0.3 px of noise
     assert select(W, visible, PERSPECTIVE).kind != "sheet"  # nothing makes one
 
 

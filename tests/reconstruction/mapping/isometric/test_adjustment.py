@@ -1,4 +1,4 @@
-"""A sheet of unknown shape from its keyframes: accuracy, units, gaps, gross errors, strays, focal length, halves."""
+"""A sheet of unknown shape from its keyframes: accuracy, units, gaps, gross errors, strays, focal length."""
 
 from dataclasses import replace
 from functools import cache
@@ -10,7 +10,7 @@ from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.isometric.adjustment import sheet
-from reconstruction.mapping.isometric.focal import focal, halves_disagreement
+from reconstruction.mapping.isometric.focal import focal
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 
@@ -98,9 +98,6 @@ def test_lengths_hold_the_focal_length() -> None:
     assert search.known
     assert search.focal_px == pytest.approx(CAMERA.focal_px, rel=0.08)
 
-
-def test_halves_agree_where_the_sheet_is_good() -> None:
-    assert np.median(halves_disagreement(waving()[2])) < 0.04
 
 
 def test_what_cannot_be_done_is_said() -> None:
