@@ -16,12 +16,12 @@ from app.options.run import parse_range
 from app.painting.compositing import Placement
 from app.painting.painter import Painter
 from app.painting.picture import Texture
-from app.pipeline.interrupts import completed
 from app.pipeline.session import Session
 from app.pipeline.summary import RunSummary
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.exit_code import ExitCode
+from app.terminal.interrupts import completed
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary
 from tracking.klt import Observation

@@ -1,8 +1,8 @@
 """All frames of an object once more, with what it turned out to be."""
 
-from app.pipeline.interrupts import completed
 from app.pipeline.tracked_object import TrackedObject
 from app.recording.process import RecordingProcess
+from app.terminal.interrupts import completed
 from app.terminal.progress import Progress
 
 

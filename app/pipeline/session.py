@@ -13,7 +13,6 @@ from app.files.writing import check_free
 from app.options.run import Run
 from app.pipeline.counts import Counts
 from app.pipeline.final_pass import final_pass
-from app.pipeline.interrupts import completed
 from app.pipeline.prefetch import Prefetch
 from app.pipeline.processed import InOrder, Processed, Surface
 from app.pipeline.stopwatch import Stopwatch
@@ -22,6 +21,7 @@ from app.pipeline.summary import RunSummary, summary_of
 from app.pipeline.tracked_object import FrameShape, TrackedObject
 from app.recording.process import RecordingProcess
 from app.terminal.errors import UsageError, in_a_line
+from app.terminal.interrupts import completed
 from app.terminal.progress import Progress
 from reconstruction import ReconstructionError
 from tracking.guarded import Change, Guarded
@@ -59,7 +59,7 @@ class Session:
         self.fps, self.interrupted = 0.0, False
 
     def run(self) -> RunSummary:
-        """Process the whole source; an interrupt ends it early, with everything so far kept. Raises what `frames` raises."""
+        """Process the whole source; an interrupt ends it early, with all so far kept. Raises what `frames` raises."""
         self._order.wanted = False
         deque(self.frames(), maxlen=0)
         return self.summary

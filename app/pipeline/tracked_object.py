@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.files.stored_tracks import StoredFrame, StoredTracks
 from app.files.writing import writable
 from app.options.run import Run, configuration
 from app.painting.compositing import Placement, painted
@@ -14,7 +15,6 @@ from app.pipeline.estimates import Collected, Scores, save_shapes
 from app.pipeline.prepare import prepared
 from app.pipeline.processed import Surface
 from app.pipeline.stopwatch import Stopwatch
-from app.pipeline.stored_tracks import StoredFrame, StoredTracks
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.online import Phase
 from tracking.guarded import Change, Guarded, GuardedTracker

@@ -99,7 +99,6 @@ def test_lengths_hold_the_focal_length() -> None:
     assert search.focal_px == pytest.approx(CAMERA.focal_px, rel=0.08)
 
 
-
 def test_what_cannot_be_done_is_said() -> None:
     W, _, _ = waving()
     with pytest.raises(ReconstructionError, match="perspective"):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from app.pipeline.stored_tracks import StoredFrame, StoredTracks
+from app.files.stored_tracks import StoredFrame, StoredTracks
 from tracking.klt import Observation
 
 
