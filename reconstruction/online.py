@@ -114,10 +114,10 @@ class Reconstruction:
         if self._keyframes is not None:
             self._keyframes.offer(self._frame, W, visible)
         if self.window is not None:
-            if self.map is None:
+            if self.map is None or self.deformation != "inextensible":
                 return [self.window.advance(W, visible)]
-            last = None if self.window.state is None else self.window.last_shape()
-            return [self.window.advance(W, visible, self.map.expected(self.window.model, W, visible, last))]
+            expected = self.map.expected(self.window.model, W, visible, self.window.state)
+            return [self.window.advance(W, visible, expected)]
         if self.settings.modes >= W.shape[1]:
             problem = f"modes {self.settings.modes} does not fit {W.shape[1]} points: choose fewer"
             raise ReconstructionError(problem, "modes")

@@ -14,6 +14,7 @@ from reconstruction.state import State
 
 COARSE_VERTICES = 60
 FITTING_SWEEPS = 15  # of pose and Λ in turn
+STAYS = 0.02  # pull of Λ to the frame before, against 1 of a mode that shows in all points
 
 
 class Model:
@@ -71,21 +72,28 @@ class Model:
             frame, quaternion_from_rotation(R), R, t, s, Lambda, shape, projection.T.copy(), residual, visible
         )
 
-    def state_of(self, shape: Array, focal_px: float) -> State:
+    def state_of(self, shape: Array, focal_px: float, seen: Mask, last: State | None) -> State:
         """Pose and Λ' (n = 1) with which the model comes nearest to a shape.
 
         Args:
             shape: (3, p) in camera axes and pixels.
             focal_px: at this depth a pixel of the shape is one of the image, also with an orthographic camera.
+            seen: (p,) the points to come near to.
+            last: the frame before, if there is one (n >= 1): what does not show in these points stays as it was.
         """
-        centre = shape.mean(axis=1, keepdims=True)
-        rest, Upsilon = self.B[:3] * self.radius, self.basis.Upsilon
-        deformation = np.zeros((3, len(Upsilon)))
+        rest, Upsilon, shown = self.B[:3] * self.radius, self.basis.Upsilon, seen.sum()
+        before = np.zeros((3, len(Upsilon))) if last is None else last.Lambda[-1] * self.unit
+        held = np.linalg.inv(Upsilon[:, seen] @ Upsilon[:, seen].T + STAYS * np.eye(len(Upsilon)))
+        deformation = before
         for _ in range(FITTING_SWEEPS):
-            R = nearest_rotation((shape - centre) @ (rest + deformation @ Upsilon).T)
-            deformation = (R.T @ (shape - centre) - rest) @ Upsilon.T
-        s = focal_px / centre[2, 0]
-        t = s * centre[:2, 0] / self.radius
+            model = rest + deformation @ Upsilon
+            centred = [S[:, seen] - S[:, seen].sum(axis=1, keepdims=True) / shown for S in (shape, model)]
+            R = nearest_rotation(centred[0] @ centred[1].T)
+            origin = (shape - R @ model)[:, seen].sum(axis=1, keepdims=True) / shown
+            wanted = (R.T @ (shape - origin) - rest)[:, seen] @ Upsilon[:, seen].T
+            deformation = (wanted + STAYS * before) @ held
+        s = focal_px / origin[2, 0]
+        t = s * origin[:2, 0] / self.radius
         return State(quaternion_from_rotation(R)[None], t[None], np.array([np.log(s)]), deformation[None] / self.unit)
 
     def coarse_edges(self, vertices: int = COARSE_VERTICES) -> CoarseEdges:

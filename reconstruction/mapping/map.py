@@ -46,24 +46,24 @@ class Map:
     sheet: IsometricSheet | None = None
     unit_px: float = 1.0
 
-    def expected(self, model: Model, W: Array, visible: Mask, last: Array | None) -> State | None:
+    def expected(self, model: Model, W: Array, visible: Mask, last: State | None) -> State | None:
         """Pose and Λ' of a sheet in another frame, by its lengths; None for a solid, or with too few points.
 
         Args:
             model: the modes of the rest shape.
             W: (2, p) px; anything where not visible.
             visible: (p,).
-            last: (3, p) the shape in the frame before, if there is one: the depth of an orthographic view has either sign.
+            last: the frame before, if there is one: what does not show stays, and orthographic depth keeps its sign.
         """
         if self.sheet is None or visible.sum() < FEWEST_POINTS:
             return None
         found = self.sheet.finish(np.where(visible, W, 0.0)[None], visible[None]).shapes()[0]
         shape = self.unit_px * completed(found, self.rest.motion.shape)
         if last is not None and not self.camera.perspective:
-            depth = shape[2] - shape[2].mean()
-            if depth @ (last[2] - last[2].mean()) < 0:
+            depth, before = shape[2] - shape[2].mean(), (last.matrices()[-1] @ model.B)[2]
+            if depth @ (before - before.mean()) < 0:
                 shape[2] -= 2 * depth
-        return model.state_of(shape, self.sheet.camera.focal_px)
+        return model.state_of(shape, self.sheet.camera.focal_px, visible, last)
 
     def scaled(self, factor: float) -> "Map":
         """The same, so many times as large, and so many times as far away."""

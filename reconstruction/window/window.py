@@ -90,7 +90,7 @@ class SlidingWindow:
             return self._near(W, visible, expected)
         self.frames += 1
         self._switch = None
-        weights = start_weights(self.last_shape(), W, visible, self.model.radius)
+        weights = start_weights(self._last_shape(), W, visible, self.model.radius)
         self._data.append(image_statistics(self.model, W, weights))
         found = self._adjusted(self._started(W, weights))
         surprised = self._surprising(found)
@@ -129,7 +129,7 @@ class SlidingWindow:
         last = self.state[-1:]
         return self.model.projection(extrapolated(self.state[-2:-1], last) if len(self.state) > 1 else last).T
 
-    def last_shape(self) -> Array:
+    def _last_shape(self) -> Array:
         """The last frame's shape (3, p), px, its first two rows as seen by the camera."""
         if self.state is None:
             last = self._motion.R[0] @ self._motion.shape

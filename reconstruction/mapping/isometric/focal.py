@@ -13,6 +13,7 @@ from reconstruction.mapping.isometric.sheet import IsometricSheet
 FACTORS = (0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8)  # of the focal length that are tried first
 CLOSER = (0.93, 1.0, 1.08)
 RISE = 1.5  # times the least change of length, to which it must rise on both sides
+ALIKE = 1.02  # times the least change of length, up to which the focal length assumed so far is as good
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,8 @@ def focal(sheet: IsometricSheet) -> FocalSearch:
     strains = np.array([tried[k] for k in focals])
     k = int(strains.argmin())
     known = min(strains[:k].max(initial=0.0), strains[k + 1 :].max(initial=0.0)) > RISE * strains[k]
+    if strains[focals == f][0] < ALIKE * strains[k]:
+        return FocalSearch(f, bool(known), focals, strains)
     if 0 < k < len(focals) - 1:
         x, y = np.log(focals[k - 1 : k + 2]), strains[k - 1 : k + 2] ** 2
         a, b, _ = np.polyfit(x - x[1], y, 2)

@@ -26,9 +26,9 @@ def waving() -> tuple[np.ndarray, np.ndarray, Map]:
 def expected_error(found: Map, W: np.ndarray, truth: np.ndarray) -> float:
     """Of the shapes of all frames, as the modes of the rest shape hold them."""
     model = build_model(found.rest, found.camera, 20)
-    shapes = []
+    shapes, state = [], None
     for w in W:
-        state = found.expected(model, w, np.ones(POINTS, bool), shapes[-1] if shapes else None)
+        state = found.expected(model, w, np.ones(POINTS, bool), state)
         assert state is not None
         shapes.append(model.estimate(0, w, np.ones(POINTS, bool), state).shape)
     return float(e3d(np.stack(shapes), truth).mean())
