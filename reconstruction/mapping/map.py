@@ -31,18 +31,12 @@ class Map:
     Attributes:
         rest: the rest shape, posed in each keyframe; pixels of the first keyframe.
         camera: with the focal length that the keyframes hold, else as given.
-        evidence: why it is that kind of thing.
-        images: (K, 2, p) px of the keyframes, and
-        visible: (K, p) what is seen in them.
         sheet: its depths and lengths, if it is a sheet.
         unit_px: pixels of the first keyframe in a unit of the sheet.
     """
 
     rest: RestShape
     camera: Camera
-    evidence: Evidence
-    images: Array
-    visible: Mask
     sheet: IsometricSheet | None = None
     unit_px: float = 1.0
 
@@ -112,7 +106,7 @@ def solid_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, es
     if estimate_focal and np.nanmedian(found.residual_px) > RIGID * rms_radius(found.shape):
         found = bundle_adjust(W, visible, camera, refine_focal=False)
     rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
-    return Map(rest, found.camera, evidence, W, visible)
+    return Map(rest, found.camera)
 
 
 def sheet_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool) -> Map:
@@ -141,7 +135,7 @@ def sheet_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, es
     s = found.camera.focal_px / (unit_px * origin[:, 2])
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, (s * unit_px)[:, None] * origin[:, :2])
     note = f"sheet from {len(W)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
-    return Map(RestShape("isometric", motion, note), camera, evidence, W, visible, found, unit_px)
+    return Map(RestShape("isometric", motion, note), camera, found, unit_px)
 
 
 def medoid(shapes: Array) -> int:
