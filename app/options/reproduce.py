@@ -21,6 +21,7 @@ Name = Literal[
     "sample",
     "paper",
     "talking-face",
+    "hard-cases",
 ]
 NAMES: tuple[str, ...] = get_args(Name)
 
@@ -43,7 +44,7 @@ class Reproduce(Json):
     """Folder for the report."""
     only: Annotated[tuple[Name, ...], tyro.conf.arg(metavar="NAME…")] = ()
     """Experiments to run, of: accuracy, peers, mode-counts, metrics, missing, basis-time, mode-shapes, organ, sample,
-    paper, talking-face; without it all."""
+    paper, talking-face, hard-cases; without it all."""
     quick: bool = False
     """Fewer settings, one seed, fewer frames: for a first look."""
     readme: Path | None = None

@@ -5,6 +5,7 @@ from app.reproduce.experiments import (
     accuracy,
     basis_time,
     footage,
+    hard_cases,
     metrics,
     missing,
     mode_counts,
@@ -25,4 +26,5 @@ CATALOG: tuple[Experiment, ...] = (
     footage.SAMPLE,
     footage.PAPER,
     footage.TALKING_FACE,
+    hard_cases.EXPERIMENT,
 )

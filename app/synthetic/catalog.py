@@ -1,0 +1,120 @@
+"""The kinds of things, and which of them nobody may tune on."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from app.arrays import Array
+from app.synthetic import sheet, solid
+from app.synthetic.path import Path
+
+Shape = Callable[[Array, float], Array]  # of places (n, 2) and a time from 0 to 1: points (n, 3)
+Maker = Callable[[np.random.Generator], Shape]
+HELD_SEEDS = 100  # seeds from this one on are held back
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of thing.
+
+    Attributes:
+        what: what a reconstruction should take it for; "" where it has no word for it.
+        shape: makes one from random numbers.
+        turn_deg: least and greatest turn.
+        late: share of the video in which it is held almost still at first.
+        held_back: not for tuning, with any seed.
+    """
+
+    what: Literal["sheet", "solid", "flat", ""]
+    shape: Maker
+    turn_deg: tuple[float, float]
+    late: float = 0.0
+    held_back: bool = False
+
+    def path(self, rng: np.random.Generator) -> Path:
+        """A path for one of them, from so near that perspective shows."""
+        return Path(float(rng.uniform(*self.turn_deg)), self.late, 2.2, rng.uniform(0, 2 * np.pi, 6))
+
+
+def waving(slope_rad: float) -> Maker:
+    """Sheets with waves of such a slope that run through them, across lines that slowly turn; never flat."""
+
+    def maker(rng: np.random.Generator) -> Shape:
+        along, length = rng.uniform(0, np.pi), rng.uniform(0.9, 1.2)
+        a, b, c = rng.uniform(0, 2 * np.pi, 3)
+
+        def shape(places: Array, time: float) -> Array:
+            t = 2 * np.pi * time
+            return sheet.bent(
+                places,
+                along + 0.4 * np.sin(t + a),
+                lambda arc: slope_rad * (0.8 + 0.2 * np.sin(2 * t + b)) * np.sin(2 * np.pi * arc / length + 2 * t + c),
+            )
+
+        return shape
+
+    return maker
+
+
+def rolling(rng: np.random.Generator) -> Shape:
+    """Paper that is rolled up to most of a half cylinder and back; never flat."""
+    along, a = rng.uniform(0, np.pi), rng.uniform(0, 2 * np.pi)
+    return lambda places, time: sheet.bent(
+        places, along + 0.2 * np.sin(2 * np.pi * time), lambda arc: (1.2 + 0.9 * np.sin(2 * np.pi * time + a)) * arc
+    )
+
+
+def coning(rng: np.random.Generator) -> Shape:
+    """Paper that is rolled up like an ice-cream cone's, around a point that wanders off its edge."""
+    side, a = rng.uniform(0, 2 * np.pi), rng.uniform(0, 2 * np.pi)
+
+    def shape(places: Array, time: float) -> Array:
+        t = 2 * np.pi * time
+        at = side + 0.3 * np.sin(t)
+        bend = 0.8 + 0.3 * np.sin(2 * t + a)
+        return sheet.coned(places, 1.0 * np.array([np.cos(at), np.sin(at)]), bend)
+
+    return shape
+
+
+def creasing(rng: np.random.Generator) -> Shape:
+    """A card with a crease that opens and closes."""
+    along, a = rng.uniform(0, np.pi), rng.uniform(0, 2 * np.pi)
+    return lambda places, time: sheet.folded(places, along, 0.9 + 0.6 * np.sin(4 * np.pi * time + a))
+
+
+def swelling(rng: np.random.Generator) -> Shape:
+    """A balloon that is blown up and let out."""
+    a = rng.uniform(0, 2 * np.pi)
+    return lambda places, time: solid.balloon(places, 0.55 - 0.4 * np.cos(3 * np.pi * time + a))
+
+
+def still(shape: Callable[[Array], Array]) -> Maker:
+    """Things that do not change."""
+    return lambda _: lambda places, _time: shape(places)
+
+
+def flat(places: Array) -> Array:
+    """A card."""
+    return np.column_stack([places, np.zeros(len(places))])
+
+
+SHEET_TURN, SOLID_TURN = (10.0, 25.0), (25.0, 40.0)
+KINDS = {
+    "waving-3": Kind("sheet", waving(0.3), SHEET_TURN),
+    "waving-5": Kind("sheet", waving(0.5), SHEET_TURN),
+    "waving-7": Kind("sheet", waving(0.7), SHEET_TURN),
+    "waving-9": Kind("sheet", waving(0.9), SHEET_TURN),
+    "rolling": Kind("sheet", rolling, SHEET_TURN),
+    "cone": Kind("sheet", coning, SHEET_TURN, held_back=True),
+    "crease": Kind("sheet", creasing, SHEET_TURN, held_back=True),
+    "card": Kind("flat", still(flat), SOLID_TURN),
+    "box": Kind("solid", still(solid.box), SOLID_TURN),
+    "box-late": Kind("solid", still(solid.box), SOLID_TURN, late=0.5),
+    "head": Kind("solid", still(solid.head), SOLID_TURN),
+    "head-late": Kind("solid", still(solid.head), SOLID_TURN, late=0.5),
+    "can": Kind("solid", still(solid.can), SOLID_TURN, held_back=True),
+    "balloon": Kind("", swelling, SOLID_TURN),
+}

@@ -1,0 +1,37 @@
+"""Shapes that do not change, seen from their front: box, can, head; and one that swells.
+
+A place is (x, y) on a rectangle of width 1; its shape is a point (x, y, z) with z to the back.
+"""
+
+import numpy as np
+
+from app.arrays import Array
+from app.synthetic.sheet import bent, folded
+
+ACROSS = 0.0  # bent from left to right
+
+
+def box(places: Array) -> Array:
+    """Two faces of a box that meet at a right angle in the middle."""
+    return folded(places, ACROSS, np.pi / 2)
+
+
+def can(places: Array) -> Array:
+    """The front of a round can."""
+    return bent(places, ACROSS, lambda arc: 2.4 * arc)
+
+
+def head(places: Array) -> Array:
+    """Like a face: part of an ellipsoid, with brow, nose and chin."""
+    x, y = places.T
+    z = 1.1 * x**2 + 0.9 * y**2
+    for height, x0, y0, wide, tall in ((0.16, 0, 0.02, 0.07, 0.13), (0.05, 0, -0.2, 0.25, 0.05), (0.06, 0, 0.3, 0.1, 0.06)):
+        z -= height * np.exp(-(((x - x0) / wide) ** 2) - ((y - y0) / tall) ** 2)
+    return np.column_stack([0.8 * x, y, z])
+
+
+def balloon(places: Array, blown: float) -> Array:
+    """A dome that swells: it keeps neither lengths nor shape; `blown` of 0 is flat, 1 a half ball."""
+    squared = (places**2).sum(axis=1)
+    wider = 1 + 0.25 * blown
+    return np.column_stack([places * wider, -0.4 * blown * np.exp(-squared / 0.2)])

@@ -1,0 +1,30 @@
+"""Sheets are bent, never stretched."""
+
+import numpy as np
+import pytest
+
+from app.synthetic.catalog import KINDS
+from app.synthetic.scene import scene
+
+SHEETS = [name for name, kind in KINDS.items() if kind.what == "sheet"]
+
+
+@pytest.mark.parametrize("name", SHEETS)
+@pytest.mark.parametrize("frame", [0, 47])
+def test_lines_keep_their_lengths(name: str, frame: int) -> None:
+    rng = np.random.default_rng(frame)
+    for _ in range(3):
+        begin, end = rng.uniform(-0.5, 0.5, (2, 2)) * (1, 0.75)
+        line = begin + np.linspace(0, 1, 300_001)[:, None] * (end - begin)
+        points = scene(name, 3).shape(line, frame / 119)
+        length = np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
+        assert length == pytest.approx(np.hypot(*(end - begin)), rel=2e-6 if name == "crease" else 1e-6)
+
+
+@pytest.mark.parametrize("name", SHEETS)
+def test_they_bend(name: str) -> None:
+    x = np.linspace(-0.5, 0.5, 9)
+    places = np.column_stack([np.tile(x, 9), np.repeat(0.75 * x, 9)])
+    shapes = [scene(name, 3).shape(places, time) for time in np.linspace(0, 1, 7)]
+    relief = [np.linalg.svd(shape - shape.mean(axis=0), compute_uv=False)[2] for shape in shapes]
+    assert max(relief) > 0.05 * np.sqrt(len(places)) * 0.3
