@@ -10,7 +10,7 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis import constraints, distances
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model, build_model
-from reconstruction.basis.rest_shape import RestShape
+from reconstruction.basis.rest_shape import RestShape, scaled_to
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping import focal, rest_shape
@@ -124,7 +124,7 @@ class Reconstruction:
         self._waiting.append((W, visible))
         n, wanted = len(self._waiting), self.settings.bootstrap_frames
         if self.rest is not None:
-            return self._start(self.rest)
+            return self._start(scaled_to(self.rest, W, visible))
         if wanted == "auto":
             if n in BOOTSTRAP_SCHEDULE:
                 return self._decide(last=n == BOOTSTRAP_SCHEDULE[-1])

@@ -194,7 +194,7 @@ class Playback:
         if not self.shaped[i]:
             return None
         q = quaternion_from_rotation(rotation_from_quaternion(self.quaternion[i]) @ model.basis.Phi)
-        t, log_s = self.t[i] / model.radius, np.log(self.s[i])
+        t, log_s = self.t[i] / model.radius_px, np.log(self.s[i])
         state = State(q[None], t[None], np.array([log_s]), self.Lambda[i][None] / model.unit)
         return model.estimate(i, self.W[i], self.visible[i], state)
 

@@ -89,7 +89,7 @@ def window_step(model: Model, r: int, deformation: str) -> WindowStep:
     energy = Energy(rows=ROWS[deformation])
     B = np.concatenate([model.B[: 3 + r], model.B[-1:]])
     W = images(B, true_motion(WINDOW + 2, r, energy.rows), model.focal)
-    W += NOISE_PX / model.radius * rng.normal(size=W.shape)
+    W += NOISE_PX / model.radius_px * rng.normal(size=W.shape)
     data = [summed(B, w, model.focal) for w in W]
     first = State(true_motion(1, r, ()).q, np.zeros((1, 2)), np.zeros(1), np.zeros((1, 3, r)))
     state = minimise(energy, stack(data[:-1]), join([first] * (WINDOW + 1)), None, CONVERGED).state

@@ -1,4 +1,8 @@
-"""A rest shape with its modes made dimensionless, seen by a camera: from pixels to the solver and back (paper §3.3)."""
+"""A rest shape with its modes made dimensionless, seen by a camera: from its units to the solver and back (paper §3.3).
+
+Inside, lengths are over the rest shape's RMS radius, and image points over the radius that it has in the first frame,
+whatever the units of the two are.
+"""
 
 import numpy as np
 
@@ -18,48 +22,54 @@ STAYS = 0.02  # pull of Λ to the frame before, against 1 of a mode that shows i
 
 
 class Model:
-    """A modal basis seen by a camera, in units of the rest shape's RMS radius and in its principal frame.
+    """A modal basis seen by a camera, dimensionless and in the rest shape's principal frame.
+
+    Args:
+        scale: pixels of the first frame in a unit of the rest shape.
 
     Attributes:
-        basis: the modes, in pixels.
+        basis: the modes, in units of the rest shape.
         mesh: connectivity of the points.
         camera: the camera, in pixels.
-        radius: RMS distance of the rest shape's points to their centroid, px: the unit of length inside.
+        scale: as given.
+        radius: RMS distance of the rest shape's points to their centroid: the unit of length inside.
+        radius_px: the same in the first frame: the unit of image points inside.
         B: (4 + r, p) rows S̄', Υ' = √p Υ, 1.
-        focal: focal length in units of `radius`.
+        focal: focal length in units of `radius_px`.
     """
 
-    def __init__(self, basis: ModalBasis, mesh: Mesh, camera: Camera) -> None:
-        self.basis, self.mesh, self.camera = basis, mesh, camera
+    def __init__(self, basis: ModalBasis, mesh: Mesh, camera: Camera, scale: float = 1.0) -> None:
+        self.basis, self.mesh, self.camera, self.scale = basis, mesh, camera, scale
         p = basis.rest.shape[1]
         self.radius = rms_radius(basis.rest)
-        self.focal = camera.focal_px / self.radius
+        self.radius_px = scale * self.radius
+        self.focal = camera.focal_px / self.radius_px
         self.B = np.concatenate([basis.Phi.T @ basis.rest / self.radius, np.sqrt(p) * basis.Upsilon, np.ones((1, p))])
 
     @property
     def unit(self) -> float:
-        """What Λ' is multiplied by to give Λ in pixels."""
+        """What Λ' is multiplied by to give Λ in units of the rest shape."""
         return self.radius * float(np.sqrt(self.B.shape[1]))
 
     def normalised(self, W: Array) -> Array:
         """Image points (2, p) px as the solver wants them."""
-        return (W - self.camera.center_px[:, None]) / self.radius
+        return (W - self.camera.center_px[:, None]) / self.radius_px
 
     def projection(self, state: State, frame: int = -1) -> Array:
         """Image (2, p) px of one frame of a state."""
         seen = state.matrices()[frame] @ self.B
         depth = 1 + seen[2] / self.focal
-        return seen[:2] / depth * self.radius + self.camera.center_px[:, None]
+        return seen[:2] / depth * self.radius_px + self.camera.center_px[:, None]
 
     def residuals(self, W: Array, state: State, frame: int = -1) -> Array:
         """Reprojection errors (2, p) px of one frame of a state."""
         return W - self.projection(state, frame)
 
     def estimate(self, frame: int, W: Array, visible: Mask, state: State, row: int = -1) -> ShapeEstimate:
-        """One frame of a state in pixels; the observation W (2, p) gives the residuals."""
+        """One frame of a state in the units of rest shape and image; the observation W (2, p) gives the residuals."""
         R = rotation_from_quaternion(state.q[row]) @ self.basis.Phi.T
-        s = float(np.exp(state.log_s[row]))
-        t = state.t[row] * self.radius
+        s = self.scale * float(np.exp(state.log_s[row]))
+        t = state.t[row] * self.radius_px
         Lambda = state.Lambda[row] * self.unit
         if self.camera.perspective:
             origin = np.array([t[0] / s, t[1] / s, self.camera.focal_px / s])
@@ -76,8 +86,8 @@ class Model:
         """Pose and Λ' (n = 1) with which the model comes nearest to a shape.
 
         Args:
-            shape: (3, p) in camera axes and pixels.
-            focal_px: at this depth a pixel of the shape is one of the image, also with an orthographic camera.
+            shape: (3, p) in camera axes and units of the rest shape.
+            focal_px: focal length that its depth goes with, also of an orthographic camera.
             seen: (p,) the points to come near to.
             last: the frame before, if there is one (n >= 1): what does not show in these points stays as it was.
         """
@@ -93,8 +103,8 @@ class Model:
             wanted = (R.T @ (shape - origin) - rest)[:, seen] @ Upsilon[:, seen].T
             deformation = (wanted + STAYS * before) @ held
         s = focal_px / origin[2, 0]
-        t = s * origin[:2, 0] / self.radius
-        return State(quaternion_from_rotation(R)[None], t[None], np.array([np.log(s)]), deformation[None] / self.unit)
+        t, log_s = s * origin[:2, 0] / self.radius_px, np.log(s / self.scale)
+        return State(quaternion_from_rotation(R)[None], t[None], np.array([log_s]), deformation[None] / self.unit)
 
     def coarse_edges(self, vertices: int = COARSE_VERTICES) -> CoarseEdges:
         """Edges of a coarse mesh through well-spread points, triangulated in the main plane."""
@@ -121,4 +131,4 @@ def build_model(
         area = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a])
         if area.sum() > 0:  # y points down: outward normals face the camera when the image winds the other way
             mesh = mesh_from_faces(mesh.faces[:, ::-1])
-    return Model(modal_basis(shape, mesh, modes, metric), mesh, camera)
+    return Model(modal_basis(shape, mesh, modes, metric), mesh, camera, float(rest.motion.s[0]))

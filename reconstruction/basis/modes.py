@@ -22,7 +22,7 @@ class ModalBasis:
     """A rest shape and its modes, S = S̄ + ΦΛΥ (Eq. 3).
 
     Attributes:
-        rest: (3, p) centred rest shape S̄, pixels of the first frame.
+        rest: (3, p) centred rest shape S̄; pixels of the first frame, unless it was given in other units.
         Upsilon: (r, p) leading eigenvectors of −½CDC as rows (Eq. 4).
         eigenvalues: (r,) their eigenvalues, descending.
         Phi: (3, 3) rotation whose columns are the principal axes α, β, τ (Eq. 6).

@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from reconstruction.arrays import Array, Indices
+from reconstruction.arrays import Array, Indices, Mask
 
 Kind = Literal["rigid", "plane", "isometric", "mesh", "truth"]
 
@@ -66,6 +66,19 @@ def given(shape: Array, kind: Kind, note: str) -> RestShape:
     """A rest shape (3, p) from elsewhere: a mesh file, or the first true shape."""
     shape = shape - shape.mean(axis=1, keepdims=True)
     return RestShape(kind, RigidMotion(shape, np.eye(3)[None], np.ones(1), np.zeros((1, 2))), note)
+
+
+def scaled_to(rest: RestShape, W: Array, visible: Mask) -> RestShape:
+    """A rest shape from elsewhere with its scale in the first frame (2, p) px, by the points visible (p,).
+
+    Of distances from the middle the medians are compared: gross errors of single points do not matter.
+    """
+
+    def size(points: Array) -> float:
+        return float(np.median(np.linalg.norm(points - np.median(points, axis=1, keepdims=True), axis=0)))
+
+    placed = (rest.motion.R[0] @ rest.motion.shape)[:2, visible]
+    return replace(rest, motion=replace(rest.motion, s=np.array([size(W[:, visible]) / size(placed)])))
 
 
 def is_flat(shape: Array) -> bool:

@@ -13,7 +13,7 @@ TURN_DEGREES = 10.0  # less turn than this and depth drowns in noise
 RELIEF_OVER_NOISE = 3.0  # third over fourth singular value of the observations
 HALVES_AGREE = 0.10  # relative difference of the shapes of even and odd frames
 JUDGING_POINTS = 150  # well-spread points are enough to decide on
-STILL_PX = 0.5  # apparent motion, beyond that of a similarity, that is not noise
+STILL = 0.006  # apparent motion, beyond that of a similarity, that is not noise; of the image's RMS extent
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def weigh(W: Array, visible: Mask) -> Evidence:
     W, visible = W[:, :, chosen], visible[:, chosen]
     result = factorize(W, visible)
     moved = apparent_change(W, visible)
-    turn = view_turn_degrees(result.motion.R) if moved > STILL_PX else foreshortening_degrees(W, visible)
+    turn = view_turn_degrees(result.motion.R) if moved > STILL else foreshortening_degrees(W, visible)
     relief = float(result.singular_values[2] / max(result.singular_values[3], 1e-12))
     disagreement = halves_disagreement(W, visible)
     doubt = ""
@@ -68,24 +68,32 @@ def judging_points(W: Array, visible: Mask) -> Indices:
 
 
 def image_affinities(W: Array, visible: Mask) -> tuple[Array, Array]:
-    """Affine maps (F, 2, 2) of the first image onto each, and what they leave over, (F,) RMS px."""
+    """Affine maps (F, 2, 2) of the first image onto each, and what they leave over, (F,) RMS over the first's extent."""
     both = (visible & visible[0]).astype(np.float64)
-    first = np.where(visible[0], W[0], 0.0)
+    middle, size = W[0][:, visible[0]].mean(axis=1, keepdims=True), extent(W[0][:, visible[0]])
+    first = np.where(visible[0], W[0] - middle, 0.0) / size
     B = np.concatenate([first, np.ones((1, W.shape[2]))])
     gram = np.einsum("ip,fp,jp->fij", B, both, B, optimize=True)
-    known = np.where(both[:, None] > 0, W, 0.0)
+    known = np.where(both[:, None] > 0, W - middle, 0.0) / size
     maps = np.linalg.solve(gram + 1e-9 * np.eye(3), np.einsum("fcp,ip->fic", known, B)).transpose(0, 2, 1)
     left = (known - maps @ B) * both[:, None]
     return maps[:, :, :2], np.sqrt((left**2).sum(axis=(1, 2)) / both.sum(axis=1).clip(1))
 
 
 def apparent_change(W: Array, visible: Mask) -> float:
-    """Largest RMS motion in pixels of a frame against the first beyond a similarity: what turning or bending causes."""
+    """Largest RMS motion of a frame against the first beyond a similarity, over the first's extent.
+
+    Turning and bending cause it.
+    """
     maps, left = image_affinities(W, visible)
-    size = float(np.sqrt(np.var(np.where(visible[0], W[0], np.nan)[:, visible[0]], axis=1).sum() / 2))
     values = np.linalg.svd(maps, compute_uv=False)
-    stretch = (values[:, 0] - values[:, 1]) / 2 * size
+    stretch = (values[:, 0] - values[:, 1]) / 2
     return float(np.sqrt(stretch**2 + left**2).max())
+
+
+def extent(points: Array) -> float:
+    """RMS extent of points (2, n) in one coordinate."""
+    return float(np.sqrt(np.var(points, axis=1).mean()))
 
 
 def foreshortening_degrees(W: Array, visible: Mask) -> float:

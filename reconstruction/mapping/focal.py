@@ -111,7 +111,7 @@ class Trials:
             window.advance(w, v)
             assert window.state is not None
             states.append(window.state[-1:])
-            weights.append(robust_weights(model.residuals(w, window.state), v))
+            weights.append(robust_weights(model.residuals(w, window.state) / model.radius_px, v))
         self._weights, self._solved = weights, {camera.focal_px: join(states)}
 
     def cost(self, focal_px: float) -> float:

@@ -9,9 +9,10 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.evidence import (
-    STILL_PX,
+    STILL,
     TURN_DEGREES,
     apparent_change,
+    extent,
     foreshortening_degrees,
     judging_points,
 )
@@ -21,7 +22,7 @@ from reconstruction.mapping.sheet import best_tilted, sheet
 from reconstruction.window.ambiguity import TILT_GAIN
 
 SHARP = 2.0  # times worse that a clearly other tilt fits, where the tilt shows even in a smaller turn
-BENT_PX = 1.0  # reprojection error above which a sheet is not flat in all frames
+BENT = 0.012  # reprojection error over the image's extent, above which a sheet is not flat in all frames
 FEWEST_FLAT = 10  # frames that tell a tilt
 FAR = 3.0  # times the median distance from the middle, beyond which a point's depth is not believed
 
@@ -34,7 +35,7 @@ def rigid(W: Array, visible: Mask, camera: Camera) -> RestShape:
     """
     chosen = judging_points(W, visible)
     turned = foreshortening_degrees(W[:, :, chosen], visible[:, chosen])
-    if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL_PX:
+    if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL:
         raise ReconstructionError(
             f"cannot recover a rest shape: the object turned {turned:.1f}° in {len(W)} frames, about "
             f"{TURN_DEGREES:.0f}° are needed",
@@ -90,7 +91,7 @@ def plane(W: Array, visible: Mask, camera: Camera) -> RestShape:
     first = first_image(W, visible)
     frontal = sheet(first, np.eye(3), camera)
     chosen = judging_points(W, visible)
-    if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL_PX or len(W) < 3:
+    if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL or len(W) < 3:
         return RestShape("plane", frontal, "flat sheet facing the camera: the first frames show no turn")
     frames = np.unique(np.linspace(0, len(W) - 1, 16).astype(int))
     W_few, visible_few = W[frames][:, :, chosen], visible[frames][:, chosen]
@@ -100,7 +101,7 @@ def plane(W: Array, visible: Mask, camera: Camera) -> RestShape:
     tilted = bundle_adjust(W_few, visible_few, start, camera, flat=True, sweeps=15)
     turn = view_turn_degrees(tilted[0].R)
     if tilted[1] > TILT_GAIN * level[1] or (turn < TURN_DEGREES and sharpness < SHARP):
-        if tilted[1] > BENT_PX and len(W) >= 2 * FEWEST_FLAT:  # it bends meanwhile: judge by the frames before
+        if tilted[1] > BENT * extent(first) and len(W) >= 2 * FEWEST_FLAT:  # it bends meanwhile: judge by the frames before
             return plane(W[: len(W) // 2], visible[: len(W) // 2], camera)
         note = f"flat sheet facing the camera: its tilt does not show in {len(W)} frames"
         return RestShape("plane", frontal, note)

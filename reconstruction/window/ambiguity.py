@@ -55,9 +55,9 @@ def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask) -> tu
     data = image_statistics(model, W, visible.astype(np.float64), rigid=True)
     seen = W[:, visible] - model.camera.center_px[:, None]
     extent = np.var((motion.R[0] @ shape)[:2, visible], axis=1).sum()
-    log_s = np.log(np.sqrt(np.var(seen, axis=1).sum() / extent))
+    log_s = np.log(np.sqrt(np.var(seen, axis=1).sum() / extent) / model.scale)
     q = quaternion_from_rotation(motion.R[0] @ model.basis.Phi)
-    start = State(q[None], seen.mean(axis=1)[None] / model.radius, np.array([log_s]), np.zeros((1, 3, 0)))
+    start = State(q[None], seen.mean(axis=1)[None] / model.radius_px, np.array([log_s]), np.zeros((1, 3, 0)))
     energy = pose_energy(model.camera)
     found = best = minimise(energy, data, start, None, Solver())
     for tilt in FIRST_TILT * tilt_axes():

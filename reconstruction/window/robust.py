@@ -19,7 +19,7 @@ def deviation(distances: Array, least: float) -> float:
 
 
 def robust_weights(residuals: Array, visible: Mask, sigmas: float = ROBUST_SIGMAS, least: float = 0.0) -> Array:
-    """Weights (p,) by residuals (2, p) px: 1 up to so many deviations, falling with the fourth power beyond."""
+    """Weights (p,) by residuals (2, p) over the surface's size: 1 up to some deviations, falling with the fourth power."""
     if visible.sum() < FEWEST_POINTS:
         return visible.astype(np.float64)
     distance = lengths(np.where(visible, residuals, 0.0))
@@ -39,7 +39,7 @@ def start_weights(last: Array, W: Array, visible: Mask, radius: float) -> Array:
     if visible.sum() < FEWEST_POINTS:
         return visible.astype(np.float64)
     off = off_the_common_motion(last, W, visible, GROSS_SIGMAS)
-    return robust_weights(off, visible, GROSS_SIGMAS, LEAST_SIGMA * radius)
+    return robust_weights(off / radius, visible, GROSS_SIGMAS, LEAST_SIGMA)
 
 
 def off_the_common_motion(shape: Array, W: Array, visible: Mask, limit: float) -> Array:
@@ -51,10 +51,11 @@ def off_the_common_motion(shape: Array, W: Array, visible: Mask, limit: float) -
         visible: (p,), at least one.
         limit: deviations beyond which a point might spoil the motion; without such points the fit ends early.
     """
-    B = np.concatenate([shape, np.ones((1, shape.shape[1]))])[:, visible]
+    size = float(np.sqrt(np.var(shape, axis=1).sum()))
+    B = np.concatenate([shape / size, np.ones((1, shape.shape[1]))])[:, visible]
     known = W[:, visible]
-    least = LEAST_SIGMA * float(np.sqrt(np.var(shape, axis=1).sum()))
-    left = known - B[:2]
+    least = LEAST_SIGMA * size
+    left = known - shape[:2, visible]
     left = left - np.median(left, axis=1)[:, None]
     for k in range(BROAD_FITS + CLOSE_FITS):
         off = lengths(left)

@@ -90,7 +90,7 @@ class SlidingWindow:
             return self._near(W, visible, expected)
         self.frames += 1
         self._switch = None
-        weights = start_weights(self._last_shape(), W, visible, self.model.radius)
+        weights = start_weights(self._last_shape(), W, visible, self.model.radius_px)
         self._data.append(image_statistics(self.model, W, weights))
         found = self._adjusted(self._started(W, weights))
         surprised = self._surprising(found)
@@ -108,7 +108,9 @@ class SlidingWindow:
     def _near(self, W: Array, visible: Mask, expected: State) -> ShapeEstimate:
         """The next frame by itself, near to what is expected."""
         self.frames += 1
-        data = image_statistics(self.model, W, robust_weights(self.model.residuals(W, expected), visible))
+        data = image_statistics(
+            self.model, W, robust_weights(self.model.residuals(W, expected) / self.model.radius_px, visible)
+        )
         energy = replace(self._energy, centre=expected.Lambda[0], rest=EXPECTED, edges=None, tied=False)
         found = minimise(energy, data, expected, None, ADJUST).state
         # The frame before stays for the prediction.
@@ -132,9 +134,9 @@ class SlidingWindow:
     def _last_shape(self) -> Array:
         """The last frame's shape (3, p), px, its first two rows as seen by the camera."""
         if self.state is None:
-            last = self._motion.R[0] @ self._motion.shape
+            last = self._motion.s[0] * self._motion.R[0] @ self._motion.shape
         else:
-            last = self.model.radius * (self.state.matrices()[-1] @ self.model.B)
+            last = self.model.radius_px * (self.state.matrices()[-1] @ self.model.B)
         return last / (1 + last[2] / self.model.camera.focal_px)
 
     def _started(self, W: Array, weights: Array) -> State:
@@ -188,7 +190,8 @@ class SlidingWindow:
     def _reweighted(self, found: Solution, W: Array, visible: Mask, weights: Array) -> Solution:
         """The newest frame adjusted again with robust weights by its residuals, until they hardly change."""
         for _ in range(REWEIGHTINGS):
-            before, weights = weights, robust_weights(self.model.residuals(W, found.state), visible)
+            left = self.model.residuals(W, found.state) / self.model.radius_px
+            before, weights = weights, robust_weights(left, visible)
             if np.abs(weights - before).sum() < REWEIGHTED * len(weights):
                 break
             self._data[-1] = image_statistics(self.model, W, weights)

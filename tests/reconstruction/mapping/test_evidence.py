@@ -41,11 +41,11 @@ def test_similarities_are_no_apparent_change(rng: np.random.Generator) -> None:
     shape = relief(rng, POINTS)
     W = np.stack([(1 + 0.1 * f) * (turn((0, 0, 10 * f)) @ shape)[:2] + 3 * f for f in range(5)])
     visible = np.ones((5, POINTS), bool)
-    assert apparent_change(W, visible) < 1e-3
+    assert apparent_change(W, visible) < 1e-5
     assert foreshortening_degrees(W, visible) < 0.5
     bent = W.copy()
-    bent[3] += 4 * rng.normal(size=bent[3].shape)
-    assert apparent_change(bent, visible) > 2
+    bent[3] += 4 * rng.normal(size=bent[3].shape)  # of about 60 px
+    assert apparent_change(bent, visible) > 0.03
 
 
 def test_foreshortening_of_a_sheet_is_its_turn() -> None:

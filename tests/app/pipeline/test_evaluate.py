@@ -1,0 +1,77 @@
+"""Evaluation: whatever the units of image and rest shape are, the outcome is the same."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.options.evaluate import Evaluate
+from app.pipeline.evaluate import Evaluation, evaluate
+from app.terminal.progress import Progress
+from reconstruction.basis.mesh import triangulate
+
+MILLI, KILO = 1e-3, 1e3
+SLOW = pytest.mark.slow
+UNITS = ((MILLI, 1.0), (KILO, 1.0), (1.0, MILLI), (1.0, KILO), (MILLI, MILLI), (KILO, MILLI))  # of shapes, of images
+
+
+def evaluated(source: Path, folder: Path, rest: str, shape: float = 1.0, image: float = 1.0) -> Evaluation:
+    """The outcome for tracks whose true shapes and images are so many times as large."""
+    with np.load(source) as arrays:
+        tracks = dict(arrays)
+    tracks["S_gt"] = shape * tracks["S_gt"]
+    tracks["W"] = image * tracks["W"]
+    if "K" in tracks:
+        tracks["K"] = np.diag([image, image, 1.0]) @ tracks["K"]
+    np.savez(folder / "tracks.npz", **tracks)
+    if rest == "mesh":
+        rest = str(folder / "rest.obj")
+        write_mesh(Path(rest), tracks["S_gt"][0])
+    return evaluate(Evaluate(folder / "tracks.npz", rest_shape=rest), Progress())
+
+
+def write_mesh(path: Path, shape: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> None:
+    """A shape (3, p) as Wavefront OBJ."""
+    vertices = "".join(f"v {x:.17g} {y:.17g} {z:.17g}\n" for x, y, z in shape.T)
+    faces = "".join(f"f {a} {b} {c}\n" for a, b, c in triangulate(shape[:2].T).faces + 1)
+    path.write_text(vertices + faces)
+
+
+@pytest.mark.parametrize(
+    ("file", "rest", "units"),
+    [
+        ("flag250", "first-truth", ((MILLI, 1.0), (1.0, KILO))),
+        ("flag250_perspective", "mesh", ((MILLI, 1.0), (KILO, MILLI))),
+        ("face37", "rigid", ((1.0, MILLI),)),
+        pytest.param("flag250", "first-truth", UNITS, marks=SLOW),
+        pytest.param("flag250_perspective", "first-truth", UNITS, marks=SLOW),
+        pytest.param("face37", "first-truth", UNITS, marks=SLOW),
+        pytest.param("face37", "rigid", UNITS, marks=SLOW),
+        pytest.param("face37", "auto", UNITS, marks=SLOW),
+        pytest.param("flag250", "auto", UNITS, marks=SLOW),
+        pytest.param("flag250_perspective", "auto", UNITS, marks=SLOW),
+        pytest.param("flag250", "plane", ((1.0, MILLI), (1.0, KILO)), marks=SLOW),
+    ],
+)
+def test_units_do_not_matter(
+    shared_data: Path, tmp_path: Path, file: str, rest: str, units: tuple[tuple[float, float], ...]
+) -> None:
+    source = shared_data / f"{file}.npz"
+    usual = evaluated(source, tmp_path, rest)
+    assert usual.score is not None
+    for shape, image in units:
+        other = evaluated(source, tmp_path, rest, shape, image)
+        assert other.score is not None
+        assert other.score.e3d == pytest.approx(usual.score.e3d, abs=1e-6), (shape, image)
+        assert other.rest_shape == usual.rest_shape
+
+
+def test_a_rest_shape_gives_the_shapes_its_units(shared_data: Path, tmp_path: Path) -> None:
+    shapes = []
+    for unit in (1.0, MILLI):
+        evaluated(shared_data / "flag250_perspective.npz", tmp_path, "first-truth", shape=unit)
+        out = tmp_path / f"shapes{unit}.npz"
+        evaluate(Evaluate(tmp_path / "tracks.npz", rest_shape="first-truth", shapes_out=out), Progress())
+        with np.load(out) as arrays:
+            shapes.append(arrays["S"])
+    np.testing.assert_allclose(shapes[1], MILLI * shapes[0], rtol=1e-6)
