@@ -37,14 +37,7 @@ class RecordingProcess:
             return
         self._connection, theirs = Pipe()
         with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "app.recording.process", str(theirs.fileno())],  # -P: not the user's modules
-                env=environment() | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-                stdin=subprocess.DEVNULL,
-                stdout=2,  # stderr: stdout is for the summary
-                pass_fds=[theirs.fileno()],
-                start_new_session=True,  # Ctrl-C ends the run, which then tells what is left to write
-            )
+            self._process = started(theirs.fileno())
         self._sender = Thread(target=self._send, name="record", daemon=True)
         self._sender.start()
 
@@ -116,6 +109,18 @@ class RecordingProcess:
         error, self._error = self._error, None
         if error is not None:
             raise error
+
+
+def started(file: int) -> "subprocess.Popen[bytes]":
+    """The other process, which talks over an open file, by its number."""
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "app.recording.process", str(file)],  # -P: not the user's modules
+        env=environment() | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+        stdin=subprocess.DEVNULL,
+        stdout=2,  # stderr: stdout is for the summary
+        pass_fds=[file],
+        start_new_session=True,  # Ctrl-C ends the run, which then tells what is left to write
+    )
 
 
 def main() -> None:

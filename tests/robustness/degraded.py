@@ -1,5 +1,6 @@
 """The sample video as bad cameras and bad days deliver it, and the errors of runs over it, frame by frame."""
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ Image = NDArray[np.uint8]
 Array = NDArray[np.float64]
 Change = Callable[[int, Image], Image]
 
+FRAMES = 150  # of the sample, where half of it will do; it bends from frame 60 on
 OCCLUDED = range(120, 150)
 COVERED = 0.4  # of the sheet
 
@@ -48,8 +50,8 @@ class Result:
         return float(self.e3d[chosen].mean())
 
 
-def run(video: Path, truth: Path, roi: tuple[int, int, int, int], folder: Path, **options: object) -> Result:
-    """Run the whole pipeline over a video, without a recording's pictures."""
+def run(video: Path, truth: Path, roi: tuple[int, int, int, int], folder: Path, frames: str = ":") -> Result:
+    """Run the whole pipeline over frames of a video, without a recording's pictures."""
     output = Output(
         out=folder / "run.rrd",
         tracks_out=folder / "tracks.npz",
@@ -57,7 +59,7 @@ def run(video: Path, truth: Path, roi: tuple[int, int, int, int], folder: Path, 
         overwrite=True,
         image="none",
     )
-    config = Run(source=str(video), roi=roi, ground_truth=truth, output=output, **options)  # type: ignore[arg-type]
+    config = Run(source=str(video), roi=roi, ground_truth=truth, output=output, frames=frames)
     words = Session(config, Progress()).run().as_dict()
     with np.load(folder / "tracks.npz") as tracks:
         visible = tracks["visible"]
@@ -88,11 +90,14 @@ def write(path: Path, pictures: Iterable[Image], size: tuple[int, int]) -> Path:
     return path
 
 
-def changed(video: Path, change: Change) -> Iterator[Image]:
-    """The pictures of a video, each changed."""
-    with Video(str(video)) as frames:
-        for frame in frames:
-            yield change(frame.index, frame.image)
+def changed(video: Path, *changes: Change, frames: int | None = None) -> Iterator[Image]:
+    """The first pictures of a video, or all of them, each changed."""
+    with Video(str(video)) as source:
+        for frame in itertools.islice(source, frames):
+            image = frame.image
+            for change in changes:
+                image = change(frame.index, image)
+            yield image
 
 
 def blurred(length_px: int) -> Change:
@@ -169,11 +174,11 @@ def occluded(truth: Path, where: str = "disc") -> Change:
 
 
 def thinned(video: Path, truth: Path, folder: Path, share: float) -> tuple[Path, Path]:
-    """A video that lost a share of its frames at random, and the truth of those that are left."""
+    """A video that lost a share of its first frames at random, and the truth of those that are left."""
     known = Truth.load(truth)
     rng = np.random.default_rng(0)
     with Video(str(video)) as frames:
-        kept = [frame for frame in frames if frame.index == 0 or rng.random() >= share]
+        kept = [frame for frame in itertools.islice(frames, FRAMES) if frame.index == 0 or rng.random() >= share]
     number = {frame.index: k for k, frame in enumerate(kept)}
     left = [k for k, f in enumerate(known.frames) if int(f) in number]
     where = folder / "thinned.npz"
