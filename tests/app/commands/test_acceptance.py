@@ -75,15 +75,14 @@ def test_sheets_that_are_never_flat(modeshape: Command, shared_data: Path, file:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("frames", "bound"), [("16:113", 0.02), ("40:113", 0.0205), ("60:113", 0.027)])
-def test_a_printed_sheet_from_any_start(modeshape: Command, shared_data: Path, frames: str, bound: float) -> None:
+def test_a_printed_sheet_that_is_bent_from_the_start_on(modeshape: Command, shared_data: Path) -> None:
     outcome = modeshape(
-        "run", shared_data / "kinect_paper.mp4", *KINECT[:-1], frames, "--json", "--out", "paper.rrd",
+        "run", shared_data / "kinect_paper.mp4", *KINECT[:-1], "60:113", "--json", "--out", "paper.rrd",
         "--ground-truth", shared_data / "kinect_paper_gt.npz",
     )  # fmt: skip
     assert outcome.code == 0, outcome.err
     words = json.loads(outcome.out)
-    assert words["e3d"] <= bound
+    assert words["e3d"] <= 0.027
     assert words["focal_px"] == pytest.approx(528, rel=0.03)
 
 
@@ -157,27 +156,26 @@ def test_a_printed_sheet_is_followed(
 @pytest.mark.slow
 def test_a_talking_face_is_followed(modeshape: Command, shared_data: Path, here: Path) -> None:
     outcome = modeshape(
-        "run", shared_data / "talking_face.mp4", "--roi", 115, 70, 130, 160, "--frames", "0:600", "--json",
+        "run", shared_data / "talking_face.mp4", "--roi", 115, 70, 130, 160, "--frames", "0:300", "--json",
         "--out", "face.rrd", "--shapes-out", "shapes.npz",
     )  # fmt: skip
     assert outcome.code == 0, outcome.err
     words = json.loads(outcome.out)
-    assert words["frames"] == 600
+    assert words["frames"] == 300
     assert words["visible_share"] > 0.8
     assert words["reprojection_rms_px"] < 3
     with np.load("shapes.npz") as shapes:
         image = shapes["K"] @ shapes["S"]
     image = image[:, :2] / image[:, 2:]
     centre, size = image.mean(axis=2), image.std(axis=2)
-    # In these 600 frames the head stays within half its size of where it was.
+    # In these frames the head stays within half its size of where it was.
     assert np.abs(centre - centre[0]).max() < 40
     assert (size / size[0]).min() > 0.7
     assert (size / size[0]).max() < 1.3
     verify(here / "face.rrd")
 
 
-def test_demo(modeshape: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, here: Path) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+def test_demo(modeshape: Command, here: Path) -> None:
     outcome = modeshape("demo", "--json")
     assert outcome.code == 0, outcome.err
     words = json.loads(outcome.out)

@@ -16,7 +16,7 @@ from tests.app.command_line import ENVIRONMENT, PROGRAM, Command
 from tests.synthetic_run import verify
 
 GOOD = ("a", "b")
-OPTIONS = ("--options=--points 100 --image none --frames :12 --modes 5",)
+OPTIONS = ("--options=--points 100 --image none --frames :12 --modes 5 --no-final-pass",)
 
 
 @pytest.fixture

@@ -73,7 +73,7 @@ def scenes(path: Path, *pictures: Iterable[Image]) -> Path:
 def run(video: Path, bootstrap_frames: int = 5, rest_shape: str = "plane", **output: object) -> dict[str, object]:
     model = Model(modes=5, bootstrap_frames=bootstrap_frames)
     written = Output(out=Path("run.rrd"), image="none", **output)  # type: ignore[arg-type]
-    config = Run(str(video), points=100, rest_shape=rest_shape, model=model, output=written)
+    config = Run(str(video), points=100, rest_shape=rest_shape, final_pass=False, model=model, output=written)
     return Session(config, Progress()).run().as_dict()
 
 
