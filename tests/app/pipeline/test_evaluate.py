@@ -47,9 +47,9 @@ def write_mesh(path: Path, shape: np.ndarray[tuple[int, ...], np.dtype[np.float6
         pytest.param("flag250_perspective", "first-truth", UNITS, marks=SLOW),
         pytest.param("face37", "first-truth", UNITS, marks=SLOW),
         pytest.param("face37", "rigid", UNITS, marks=SLOW),
-        pytest.param("face37", "auto", UNITS, marks=SLOW),
-        pytest.param("flag250", "auto", UNITS, marks=SLOW),
-        pytest.param("flag250_perspective", "auto", UNITS, marks=SLOW),
+        pytest.param("face37", "auto", ((KILO, MILLI),), marks=SLOW),
+        pytest.param("flag250", "auto", ((KILO, MILLI),), marks=SLOW),
+        pytest.param("flag250_perspective", "auto", ((KILO, MILLI),), marks=SLOW),
         pytest.param("flag250", "plane", ((1.0, MILLI), (1.0, KILO)), marks=SLOW),
     ],
 )
