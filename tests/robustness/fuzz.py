@@ -224,14 +224,8 @@ def fuzz(cases: range) -> list[dict[str, object]]:
         environment = completed_environment() | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
         command = [sys.executable, "-m", "tests.robustness.fuzz", "--worker", str(samples)]
         workers = [
-            subprocess.Popen(
-                [*command, str(cases.start + k), str(cases.stop)],
-                cwd=ROOT,
-                env=environment,
-                stdout=subprocess.PIPE,
-                text=True,
-            )
-            for k in range(WORKERS)
+            subprocess.Popen([*command, *numbers], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
+            for numbers in ((str(cases.start + k), str(cases.stop)) for k in range(WORKERS))
         ]
         results = [json.loads(line) for worker in workers for line in worker.communicate()[0].splitlines()]
     assert len(results) == len(cases), "a worker ended early"
