@@ -12,6 +12,7 @@ from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import sheet
 from reconstruction.mapping.isometric.focal import focal, with_focal
+from reconstruction.mapping.isometric.halves import Halves
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, select
 from reconstruction.mapping.solid.solid import bundle_adjust
@@ -78,9 +79,12 @@ def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool) -> Map
     if len(W) < FEWEST_KEYFRAMES:
         return None
     try:
-        evidence = select(W, visible, camera, lambda w, h, c: sheet(w, h, lens(c, w)).shapes())
-        if evidence.kind == "sheet":
-            return sheet_map(W, visible, camera, evidence, estimate_focal=estimate_focal)
+        seen_by = lens(camera, W)
+        halves = Halves(W, visible, seen_by)
+        evidence = select(W, visible, camera, halves.shapes)
+        if evidence.kind == "sheet":  # before a long lens one half does not tell whether another is its mirror image
+            found = halves.whole() if camera.perspective else sheet(W, visible, seen_by)
+            return sheet_map(camera, found, evidence, estimate_focal=estimate_focal)
         if evidence.kind == "solid":
             return solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal)
     except ReconstructionError:
@@ -109,13 +113,8 @@ def solid_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, es
     return Map(rest, found.camera)
 
 
-def sheet_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool) -> Map:
-    """The map of a sheet: its rest shape is the keyframe's shape that is nearest to all others.
-
-    Raises:
-        ReconstructionError: there are too few points.
-    """
-    found = sheet(W, visible, lens(camera, W))
+def sheet_map(camera: Camera, found: IsometricSheet, evidence: Evidence, *, estimate_focal: bool) -> Map:
+    """The map of a sheet: its rest shape is the keyframe's shape that is nearest to all others."""
     if estimate_focal and camera.perspective:
         search = focal(found)
         if search.known:
@@ -134,7 +133,7 @@ def sheet_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, es
     )
     s = found.camera.focal_px / (unit_px * origin[:, 2])
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, (s * unit_px)[:, None] * origin[:, :2])
-    note = f"sheet from {len(W)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
+    note = f"sheet from {len(shapes)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
     return Map(RestShape("isometric", motion, note), camera, found, unit_px)
 
 

@@ -27,10 +27,11 @@ from reconstruction.mapping.solid.solid import FEWEST_VIEWS, TAIL_SIGMAS, Solid,
 from reconstruction.window.robust import deviation
 
 Kind = Literal["flat", "solid", "sheet"]
-Surface = Callable[[Array, Mask, Camera], Array]
-"""Shapes (K, 3, p) of a sheet of one metric in keyframes (K, 2, p) px, visible (K, p); NaN for points left out."""
+Surface = Callable[[list[Indices]], list[Array]]
+"""Shapes (n, 3, p) of a sheet of one metric for each of several parts of the keyframes; NaN for points left out."""
 
 COMPARED = 80  # points
+RIGID_POINTS = 150  # enough to tell how well anything rigid fits
 NEIGHBOURS = 6  # of each
 OFTEN = 0.8  # of the keyframes in which a point to compare is seen
 SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
@@ -101,15 +102,19 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
         raise ReconstructionError(f"{2 * FEWEST_VIEWS} keyframes are needed to tell what the object is, not {len(W)}")
     halves = [np.arange(k, len(W), 2) for k in (0, 1)]
     seen = [(W[half], visible[half]) for half in halves]
-    edges = spread_edges(W, visible)
+    points = spread_points(W, visible)
+    edges = spread_edges(W, visible, points[:COMPARED])
+    few = np.unique(points)
+    at = np.searchsorted(few, edges)
+    views = [(w[:, :, few], h[:, few]) for w, h in seen]
     solids, planes = (
-        [bundle_adjust(w, h, camera, refine_focal=False, flat=flat) for w, h in seen] for flat in (False, True)
+        [bundle_adjust(w, h, camera, refine_focal=False, flat=flat) for w, h in views] for flat in (False, True)
     )
-    solid, flat = (rigid_misfit(models, seen, camera, edges) for models in (solids, planes))
+    solid, flat = (rigid_misfit(models, views, camera, at) for models in (solids, planes))
     sheet, change = Misfit(np.nan, np.nan), np.nan
     if surface is not None:
         with suppress(ReconstructionError):  # no sheet, then
-            sheet, change = sheet_misfit([surface(w, h, camera) for w, h in seen], seen, edges)
+            sheet, change = sheet_misfit(surface(halves), seen, edges)
     turn, relief = (float(np.mean([getattr(one, name) for one in solids])) for name in ("turn_degrees", "relief"))
     kind, sureness = decide(flat, solid, sheet, relief)
     return Evidence(kind, flat, solid, sheet, change, sureness, turn, relief)
@@ -164,13 +169,20 @@ def sheet_misfit(shapes: list[Array], seen: list[tuple[Array, Mask]], edges: Ind
     return Misfit(rms(pixels), np.nan), rms(changes)
 
 
-def spread_edges(W: Array, visible: Mask) -> Indices:
-    """Edges (n, 2) between well-spread points and those beside them, of points seen in most keyframes."""
+def spread_points(W: Array, visible: Mask) -> Indices:
+    """Well-spread points, each far from those before it, of points seen in most keyframes."""
     share = visible.mean(axis=0)
     often = np.flatnonzero(share >= min(OFTEN, float(np.median(share))))
     view = int(visible[:, often].sum(axis=1).argmax())
     often = often[visible[view, often]]
-    few = np.unique(often[farthest_points(W[view][:, often].T, COMPARED)])
+    return np.asarray(often[farthest_points(W[view][:, often].T, RIGID_POINTS)])
+
+
+def spread_edges(W: Array, visible: Mask, points: Indices) -> Indices:
+    """Edges (n, 2) between points (m,) and those beside them, in the keyframe that shows most of them."""
+    few = np.unique(points)
+    view = int(visible[:, few].sum(axis=1).argmax())
+    few = few[visible[view, few]]
     place = W[view][:, few].T
     near = np.asarray(cKDTree(place).query(place, k=range(1, min(NEIGHBOURS + 1, len(few)) + 1))[1], np.int64)[:, 1:]
     i = np.repeat(np.arange(len(few)), near.shape[1])

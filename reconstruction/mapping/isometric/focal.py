@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reconstruction.arrays import Array
-from reconstruction.mapping.isometric.adjustment import SOLVER, again
-from reconstruction.mapping.isometric.lengths import mean_log_lengths
+from reconstruction.mapping.isometric.adjustment import SOLVER
+from reconstruction.mapping.isometric.lengths import adjust_depths, mean_log_lengths, usual
 from reconstruction.mapping.isometric.nodes import edges_between
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 
@@ -14,6 +14,7 @@ FACTORS = (0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8)  # of the focal length that are
 CLOSER = (0.93, 1.0, 1.08)
 RISE = 1.5  # times the least change of length, to which it must rise on both sides
 ALIKE = 1.02  # times the least change of length, up to which the focal length assumed so far is as good
+ENOUGH = 1.1 * RISE  # ... and beyond which no focal length is tried on that side
 
 
 @dataclass(frozen=True)
@@ -34,21 +35,14 @@ class FocalSearch:
 
 
 def with_focal(sheet: IsometricSheet, focal_px: float) -> IsometricSheet:
-    """The same keyframes under another focal length, adjusted from the shapes there are."""
+    """The same keyframes under another focal length, adjusted from the shapes there are, edges weighted as they are."""
     camera = replace(sheet.camera, focal_px=focal_px)
-    seen = edges_between(sheet.nodes, sheet.field, camera)
-    c, factor = again(sheet.nodes, seen, seen.weighted(sheet.edge_weights), sheet.coefficients, sheet.field.stiffness)
-    edges = seen.weighted(factor)
+    edges = edges_between(sheet.nodes, sheet.values, camera).weighted(sheet.edge_weights)
+    c = adjust_depths(edges, sheet.coefficients, sheet.field.stiffness, SOLVER)
     g = edges.log_lengths(c)
-    logs = mean_log_lengths(edges, g)
+    off = g - (logs := mean_log_lengths(edges, g))
     return replace(
-        sheet,
-        coefficients=c,
-        log_lengths=logs,
-        edge_weights=factor,
-        strain=edges.rms(g - logs),
-        bend=SOLVER.bend,
-        camera=camera,
+        sheet, coefficients=c, log_lengths=logs, strain=edges.rms(off), change=usual(off), bend=SOLVER.bend, camera=camera
     )
 
 
@@ -67,6 +61,8 @@ def focal(sheet: IsometricSheet) -> FocalSearch:
         at = here  # outwards from the middle, each from the one before
         for factor in side:
             at = look(f * factor, at)
+            if at.strain_rms > ENOUGH * min(tried.values()):
+                break
     for factor in CLOSER:
         best = min(tried, key=lambda k: tried[k])
         if best * factor not in tried:

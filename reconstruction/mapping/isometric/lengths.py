@@ -8,6 +8,9 @@ import scipy.linalg
 from reconstruction.arrays import Array, Indices
 
 HOPELESS = 1e4  # damping with which no step helps
+ENOUGH = 1e-3  # relative decrease of a frame's cost that is not worth another step
+TOGETHER = 8  # frames are worked on at once, whatever start they come from; more would not stay near the processor
+FIRST_STEPS, LEFT = 2, 2  # after so many steps only so many starts go on
 
 
 @dataclass(frozen=True)
@@ -29,18 +32,23 @@ class Edges:
     weights: Array
 
     def log_lengths(self, c: Array) -> Array:
-        """The logs g = ½ log(μ_i²|q_i|² − 2 μ_i μ_j q_i·q_j + μ_j²|q_j|²) (F, n) at c (F, r)."""
-        mi, mj = np.exp(c @ self.B[0].T), np.exp(c @ self.B[1].T)
-        squared = mi**2 * self.squares[:, 0] - 2 * mi * mj * self.products + mj**2 * self.squares[:, 1]
-        return np.asarray(0.5 * np.log(np.maximum(squared, 1e-300)))
+        """The logs g = ½ log L (F, n) at c (F, r)."""
+        return np.asarray(0.5 * np.log(self.squared(c)[0]))
 
     def derivatives(self, c: Array) -> Array:
-        """Their derivatives (F, n, r) by c: [(μ_i²|q_i|² − μ_iμ_j q_i·q_j) b_i + (μ_j²|q_j|² − μ_iμ_j q_i·q_j) b_j] / L."""
+        """Their derivatives (F, n, r) by c: share_i b_i + (1 − share_i) b_j."""
+        return np.asarray(self.squared(c)[1][:, :, None] * (self.B[0] - self.B[1]) + self.B[1])
+
+    def squared(self, c: Array) -> tuple[Array, Array]:
+        """Squared lengths L = μ_i²|q_i|² − 2 μ_i μ_j q_i·q_j + μ_j²|q_j|² and the shares (μ_i²|q_i|² − μ_iμ_j q_i·q_j)/L.
+
+        Both are (F, n).
+        """
         mi, mj = np.exp(c @ self.B[0].T), np.exp(c @ self.B[1].T)
         cross = mi * mj * self.products
-        ii, jj = mi**2 * self.squares[:, 0] - cross, mj**2 * self.squares[:, 1] - cross
-        L = np.maximum(ii + jj, 1e-300)
-        return np.asarray((ii / L)[:, :, None] * self.B[0] + (jj / L)[:, :, None] * self.B[1])
+        ii = mi**2 * self.squares[:, 0] - cross
+        L = np.maximum(ii + mj**2 * self.squares[:, 1] - cross, 1e-300)
+        return L, ii / L
 
     def rms(self, values: Array) -> Array:
         """Weighted rms (F,) over the edges of values (F, n)."""
@@ -152,24 +160,48 @@ def finish_depths(edges: Edges, logs: Array, c: Array, stiffness: Array, bend: f
     before = frame_costs(edges, logs, c, stiffness, bend)
     damping = np.full(len(c), 1e-3)
     for _ in range(steps):
-        J = edges.derivatives(c)
+        L, share = edges.squared(c)
+        J = share[:, :, None] * (edges.B[0] - edges.B[1]) + edges.B[1]
         wJ = w[:, :, None] * J
-        H = J.transpose(0, 2, 1) @ wJ + np.diag(held)
-        right = ((edges.log_lengths(c) - logs)[:, None] @ wJ)[:, 0] + held * c
-        H += (np.einsum("frr->fr", H) * damping[:, None] + 1e-9)[:, :, None] * np.eye(c.shape[1])
+        H = J.transpose(0, 2, 1) @ wJ
+        right = ((0.5 * np.log(L) - logs)[:, None] @ wJ)[:, 0] + held * c
+        diagonal = np.einsum("frr->fr", H)
+        diagonal += held
+        diagonal += diagonal * damping[:, None] + 1e-9
         new = c - np.linalg.solve(H, right[:, :, None])[:, :, 0]
         after = frame_costs(edges, logs, new, stiffness, bend)
         better = after < before
+        done = bool((before - after < ENOUGH * before).all())
         c, before = np.where(better[:, None], new, c), np.where(better, after, before)
+        if done and better.all():
+            break
         damping = np.where(better, np.maximum(damping / 5, 1e-9), damping * 10)
     return c
 
 
 def best_start(edges: Edges, logs: Array, starts: list[Array], stiffness: Array, bend: float, steps: int = 8) -> Array:
-    """For each frame, of coefficients (F, r) finished from several starts those that keep lengths best."""
-    ends = [finish_depths(edges, logs, c, stiffness, bend, steps) for c in starts]
-    costs = np.stack([frame_costs(edges, logs, c, stiffness, bend) for c in ends])
-    return np.asarray(np.stack(ends)[costs.argmin(axis=0), np.arange(len(ends[0]))])
+    """For each frame, of coefficients (F, r) finished from several starts those that keep lengths best.
+
+    After a few steps from each start, only the best two go on.
+    """
+    frames = np.arange(len(starts[0]))
+
+    def finished(starts: list[Array], steps: int) -> tuple[Array, Indices]:
+        if len(frames) * len(starts) > TOGETHER:
+            ends = np.stack([finish_depths(edges, logs, c, stiffness, bend, steps) for c in starts])
+        else:
+            many = edges.frames(np.tile(frames, len(starts)))
+            ends = finish_depths(many, logs, np.concatenate(starts), stiffness, bend, steps).reshape(
+                len(starts), *starts[0].shape
+            )
+        order = np.stack([frame_costs(edges, logs, c, stiffness, bend) for c in ends]).argsort(axis=0)
+        return ends, order
+
+    if len(starts) > LEFT:
+        ends, order = finished(starts, FIRST_STEPS)
+        starts, steps = [ends[k, frames] for k in order[:LEFT]], steps - FIRST_STEPS
+    ends, order = finished(starts, steps)
+    return np.asarray(ends[order[0], frames])
 
 
 def robust_lengths(edges: Edges, g: Array) -> tuple[Array, Array, Array]:
@@ -183,3 +215,8 @@ def robust_lengths(edges: Edges, g: Array) -> tuple[Array, Array, Array]:
         h = (1 / (1 + (off / (2 * np.median(off) + 1e-12)) ** 2) ** 2)[:, None]
     by_edge = np.sqrt((h * squared).sum(axis=0) / np.maximum((h * edges.weights).sum(axis=0), 1e-12))
     return logs, off, by_edge
+
+
+def usual(changes: Array) -> float:
+    """Usual size of changes of length (F, n)."""
+    return float(np.median(np.abs(changes)))

@@ -5,10 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reconstruction.arrays import Array, Indices
-from reconstruction.basis.mesh import farthest_points
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.lengths import Edges, edges_of
-from reconstruction.mapping.isometric.smooth_field import SmoothField
 from reconstruction.mapping.isometric.warps import Warps
 
 NODES = 80
@@ -21,12 +19,14 @@ class Nodes:
     """Well-spread points of a sheet, where F keyframes see them.
 
     Attributes:
+        points: (m,) which points they are.
         reference: (2, m) in the reference image, px.
         images: (F, 2, m) px, smoothed.
         variance: (F, m) of a coordinate there, px².
         ends: (n, 2) edges between neighbours.
     """
 
+    points: Indices
     reference: Array
     images: Array
     variance: Array
@@ -35,15 +35,14 @@ class Nodes:
 
 def nodes_of(warps: Warps) -> Nodes:
     """Nodes of a sheet from its smooth images."""
-    known = np.flatnonzero(warps.kept)
-    at = warps.reference[:, known[farthest_points(warps.reference[:, known].T, NODES)]]
-    images = warps.images(at)
-    return Nodes(at, images, warps.variance(at), neighbours(images, NEIGHBOURS))
+    points = warps.few[:NODES]
+    images = warps.images(points)
+    return Nodes(points, warps.reference[:, points], images, warps.variance(points), neighbours(images, NEIGHBOURS))
 
 
 def nodes_in(warps: Warps, nodes: Nodes) -> Nodes:
     """The same nodes in other images."""
-    return replace(nodes, images=warps.images(nodes.reference), variance=warps.variance(nodes.reference))
+    return replace(nodes, images=warps.images(nodes.points), variance=warps.variance(nodes.points))
 
 
 def rays_of(images: Array, camera: Camera) -> Array:
@@ -66,13 +65,16 @@ def neighbours(images: Array, count: int) -> Indices:
     return found
 
 
-def edges_between(nodes: Nodes, field: SmoothField, camera: Camera) -> Edges:
-    """Edges weighted by how well each length is seen: its variance by noise against the usual strain."""
+def edges_between(nodes: Nodes, values: Array, camera: Camera) -> Edges:
+    """Edges weighted by how well each length is seen: its variance by noise against the usual strain.
+
+    `values` (p, r) are those of the functions that log depths are made of, at all points.
+    """
     i, j = nodes.ends.T
     longest = np.linalg.norm(nodes.images[:, :, i] - nodes.images[:, :, j], axis=1).max(axis=0)
     by_noise = (nodes.variance[:, i] + nodes.variance[:, j]) / np.maximum(longest, 1e-12) ** 2
     rays = rays_of(nodes.images, camera)
-    return edges_of(rays, nodes.ends, field.at(nodes.reference), 1 / (1 + by_noise / USUAL_STRAIN**2))
+    return edges_of(rays, nodes.ends, values[nodes.points], 1 / (1 + by_noise / USUAL_STRAIN**2))
 
 
 def nearest(images: Array, others: Array) -> Indices:

@@ -6,7 +6,7 @@ import numpy as np
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
-from reconstruction.mapping.isometric.lengths import best_start
+from reconstruction.mapping.isometric.lengths import best_start, usual
 from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_in, rays_of
 from reconstruction.mapping.isometric.smooth_field import SmoothField
 from reconstruction.mapping.isometric.warps import Warps
@@ -22,10 +22,12 @@ class IsometricSheet:
         warps: the frames' images as smooth functions of the reference image.
         nodes: the points whose distances were compared.
         field: smooth functions over the reference image that log depths are made of.
+        values: (p, r) of those at all points; NaN for points that no keyframe shows.
         coefficients: (F, r) of the log depths.
         log_lengths: (n,) of the nodes' edges: the metric rest shape.
         edge_weights: (n,) 1 for edges that keep their length, near 0 for those that do not.
         strain: (F,) change of length in each frame, weighted rms.
+        change: usual change of length of any edge, broken or not.
         bend: weight λ of bending that the depths were found with.
         camera: the camera.
     """
@@ -33,10 +35,12 @@ class IsometricSheet:
     warps: Warps
     nodes: Nodes
     field: SmoothField
+    values: Array
     coefficients: Array
     log_lengths: Array
     edge_weights: Array
     strain: Array
+    change: float
     bend: float
     camera: Camera
 
@@ -45,14 +49,14 @@ class IsometricSheet:
         """Change of length, rms over frames and edges: 0.003 to 0.01 where all is well."""
         return float(np.sqrt((self.strain**2).mean()))
 
+    @property
+    def log_depths(self) -> Array:
+        """(F, p) of all points; NaN for points that no keyframe shows."""
+        return np.asarray(self.coefficients @ self.values.T)
+
     def shapes(self) -> Array:
         """(F, 3, p) in camera axes, of all points, also those not visible; NaN for points that no keyframe shows."""
-        known = np.isfinite(self.warps.reference[0])
-        points = self.warps.reference[:, known]
-        S = np.full((len(self.coefficients), 3, len(known)), np.nan)
-        depth = np.exp(self.coefficients @ self.field.at(points).T)
-        S[:, :, known] = depth[:, None] * rays_of(self.warps.images(points), self.camera)
-        return S
+        return np.exp(self.log_depths)[:, None] * rays_of(self.warps.images(), self.camera)
 
     def finish(self, W: Array, visible: Mask, steps: int = 6) -> "IsometricSheet":
         """The sheet in other frames W (F, 2, p) px, each by itself, its lengths known.
@@ -64,19 +68,19 @@ class IsometricSheet:
     def in_frames(self, warps: Warps, steps: int = 6) -> "IsometricSheet":
         """The same for images already made smooth."""
         nodes = nodes_in(warps, self.nodes)
-        edges = edges_between(nodes, self.field, self.camera).weighted(self.edge_weights)
+        edges = edges_between(nodes, self.values, self.camera).weighted(self.edge_weights)
         alike = nearest(nodes.images, self.nodes.images)[:, :2]
         starts = list(self.coefficients[alike].swapaxes(0, 1))
         c = best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, steps)
-        strain = edges.rms(edges.log_lengths(c) - self.log_lengths)
-        return replace(self, warps=warps, nodes=nodes, coefficients=c, strain=strain)
+        off = edges.log_lengths(c) - self.log_lengths
+        return replace(self, warps=warps, nodes=nodes, coefficients=c, strain=edges.rms(off), change=usual(off))
 
     def strays(self) -> Mask:
         """Points (p,) that are not on the sheet: nearest to a node most of whose edges do not keep their length."""
         count = np.bincount(self.nodes.ends.ravel(), minlength=self.nodes.reference.shape[1])
         broken = np.bincount(self.nodes.ends[self.edge_weights < BROKEN].ravel(), minlength=len(count))
         stray = np.zeros(self.warps.reference.shape[1], bool)
-        kept = self.warps.kept
+        kept = self.warps.placed
         apart = np.linalg.norm(self.warps.reference[:, kept, None] - self.nodes.reference[:, None], axis=0)
         stray[kept] = (2 * broken > count)[apart.argmin(axis=1)]
         return stray

@@ -11,11 +11,16 @@ from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_fi
 FUNCTIONS = 100  # of the field that an image is made of
 ROUGH_FUNCTIONS = 20  # of the one that only says where a point would be in the reference image
 NODES = 200
-SWEEPS = 8  # of re-weighting
+ROUGH_NODES = 50
+ROUGH_SWEEPS = 4  # of re-weighting, with few functions and few points
+SWEEPS = 3  # more with all functions, the last with all points
+FEW = 250  # well-spread points that are enough to tell gross errors
+FEW_FUNCTIONS = 40  # where bending is held firmly
+ENOUGH = 0.8  # of them that must be seen
+TRIED = 8  # images by which the weight of bending is found
 FIRM = 10.0 ** np.arange(-7, 1.5, 0.5)  # weights of bending that are tried
 GROSS = 8.0  # times the usual residual: not the same point
 FIRST_FIRMNESS = 1e-5
-AGREES = 3.0  # standard deviations
 FINEST = 1e-4  # of the image's RMS radius: no residual is usually smaller
 
 
@@ -26,7 +31,9 @@ class Warps:
     Attributes:
         field: the functions, over the reference image.
         reference: (2, p) the points there, px; NaN where a point was not seen often enough.
-        kept: (p,) the points that the maps come from.
+        values: (p, r) of the functions at all points, 0 where a point has no place.
+        few: well-spread points among those placed.
+        placed: (p,) the points that any image shows.
         coefficients: (F, r, 2) of each image, px.
         weights: (F, p) of the observations, 0 where there is none.
         inlier: (F, p) observations that fit.
@@ -36,24 +43,28 @@ class Warps:
 
     field: SmoothField
     reference: Array
-    kept: Mask
+    values: Array
+    few: Indices
+    placed: Mask
     coefficients: Array
     weights: Array
     inlier: Mask
     noise_px: Array
     firmness: float
 
-    def images(self, points: Array) -> Array:
-        """Where points (2, n) of the reference image are in all images, (F, 2, n) px."""
-        return np.asarray((self.field.at(points) @ self.coefficients).transpose(0, 2, 1))
+    def images(self, points: Mask | Indices | slice = slice(None)) -> Array:
+        """Where points are in all images, (F, 2, n) px."""
+        return np.asarray((self.values[points] @ self.coefficients).transpose(0, 2, 1))
 
-    def variance(self, points: Array) -> Array:
+    def variance(self, points: Mask | Indices | slice = slice(None)) -> Array:
         """Variance (F, n) px² of a coordinate of those: small among visible points, large far from any."""
-        at, B = self.field.at(points), self.functions()
+        at = self.values[points]
         held = np.diag(self.firmness * self.field.stiffness + 1e-12)
         out = []
         for h, sigma in zip(self.weights, self.noise_px, strict=True):
-            inverse = np.linalg.inv((B.T * h) @ B / h.sum() + held) / h.sum()
+            rows = spread_rows(h > 0, self.few)
+            B, hs = self.values[rows], h[rows]
+            inverse = np.linalg.inv((B.T * hs) @ B / hs.sum() + held) / h.sum()
             out.append(sigma**2 * ((at @ inverse) * at).sum(axis=1))
         return np.array(out)
 
@@ -66,47 +77,37 @@ class Warps:
         picked = {name: getattr(self, name)[chosen] for name in ("coefficients", "weights", "inlier", "noise_px")}
         return replace(self, **picked)
 
-    def agrees(self, W: Array, visible: Mask) -> Mask:
-        """Points (p,), kept or not, that usually are where the maps say, within what is known of the place."""
-        known = np.isfinite(self.reference[0])
-        off = np.linalg.norm(W[:, :, known] - self.images(self.reference[:, known]), axis=1)
-        sigma = np.sqrt(self.variance(self.reference[:, known]) + self.noise_px[:, None] ** 2)
-        usually = median(np.where(visible[:, known], off / sigma, np.nan))
-        found = np.zeros(len(known), bool)
-        found[known] = usually < AGREES
-        return found
 
-    def functions(self) -> Array:
-        """Values (p, r) of the functions at the points kept, 0 at the others."""
-        B = np.zeros((len(self.kept), len(self.field.stiffness)))
-        B[self.kept] = self.field.at(self.reference[:, self.kept])
-        return B
-
-
-def smooth_warps(W: Array, visible: Mask, kept: Mask | None = None, reference: Array | None = None) -> Warps:
-    """Smooth images of W (F, 2, p) px, by visibility (F, p).
-
-    From the points kept (p,), all by default; over the reference image (2, p), if it is known already.
-    """
+def smooth_warps(W: Array, visible: Mask) -> Warps:
+    """Smooth images of W (F, 2, p) px, by visibility (F, p)."""
     F, _, p = W.shape
-    reference = reference_image(W, visible) if reference is None else reference
-    known = np.isfinite(reference[0]) & (True if kept is None else kept)
-    nodes = np.flatnonzero(known)[farthest_points(reference[:, known].T, NODES)]
-    field = smooth_field(reference[:, nodes], FUNCTIONS)
+    reference = reference_image(W, visible)
+    placed: Mask = np.isfinite(reference[0])
+    few = np.flatnonzero(placed)[farthest_points(reference[:, placed].T, FEW)]
+    field = smooth_field(reference[:, few[:NODES]], FUNCTIONS)
+    values = np.zeros((p, len(field.stiffness)))
+    values[placed] = field.at(reference[:, placed])
     nothing = np.zeros((F, p))
-    empty = Warps(field, reference, known, np.zeros((F, 0, 2)), nothing, nothing > 0, np.ones(F), FIRST_FIRMNESS)
-    B = empty.functions()
-    firmness = FIRST_FIRMNESS
+    empty = Warps(
+        field, reference, values, few, placed, np.zeros((F, 0, 2)), nothing, nothing > 0, np.ones(F), FIRST_FIRMNESS
+    )
+    return fitted(empty, W, visible, found_firmness(empty, W, visible))
+
+
+def found_firmness(warps: Warps, W: Array, visible: Mask) -> float:
+    """Weight of bending that suits images W (F, 2, p) px: by some of them, and by some of the points."""
+    some, firmness = np.unique(np.linspace(0, len(W) - 1, TRIED).astype(int)), FIRST_FIRMNESS
+    few = replace(warps, values=warps.values[warps.few], few=np.arange(len(warps.few)), placed=warps.placed[warps.few])
+    W, visible = W[some][:, :, warps.few], visible[some][:, warps.few]
     for _ in range(2):
-        firmness = cross_validated(B, W, fitted(empty, W, visible, firmness).weights, field.stiffness)
-    return fitted(empty, W, visible, firmness)
+        firmness = cross_validated(few.values, W, fitted(few, W, visible, firmness).weights, few.field.stiffness)
+    return firmness
 
 
 def fitted(warps: Warps, W: Array, visible: Mask, firmness: float) -> Warps:
     """Images W (F, 2, p) px made smooth with the functions of other warps."""
-    B = warps.functions()
-    pairs = zip(W, visible & warps.kept, strict=True)
-    fits = [robust_fit(B, w, h, warps.field.stiffness, firmness) for w, h in pairs]
+    pairs = zip(W, visible & warps.placed, strict=True)
+    fits = [robust_fit(warps.values, w, h, warps.field.stiffness, firmness, warps.few) for w, h in pairs]
     coefficients, weights, inlier, noise = (np.stack(parts) for parts in zip(*fits, strict=True))
     return replace(warps, coefficients=coefficients, weights=weights, inlier=inlier, noise_px=noise, firmness=firmness)
 
@@ -123,7 +124,7 @@ def reference_image(W: Array, visible: Mask) -> Array:
         if f == fullest or len(both) < 2 * ROUGH_FUNCTIONS:
             said[f][:, h] = w[:, h] if f == fullest else np.nan
             continue
-        nodes = both[farthest_points(w[:, both].T, NODES // 2)]
+        nodes = both[farthest_points(w[:, both].T, ROUGH_NODES)]
         field = smooth_field(w[:, nodes], ROUGH_FUNCTIONS)
         B = field.at(w[:, h])
         target = W[fullest][:, h]
@@ -132,41 +133,68 @@ def reference_image(W: Array, visible: Mask) -> Array:
     return median(said)
 
 
-def robust_fit(B: Array, w: Array, seen: Mask, stiffness: Array, firmness: float) -> tuple[Array, Array, Mask, float]:
+def spread_rows(seen: Mask, few: Indices) -> Indices:
+    """Well-spread points among those seen (p,): of the few if there are enough of them, else all."""
+    rows = few[seen[few]]
+    return rows if len(rows) > ENOUGH * len(few) else np.flatnonzero(seen)
+
+
+def robust_fit(
+    B: Array, w: Array, seen: Mask, stiffness: Array, firmness: float, few: Indices | None = None
+) -> tuple[Array, Array, Mask, float]:
     """Smooth function through image points w (2, p), Geman-McClure weights, B (p, r) the functions at the points.
+
+    Gross errors must not bend it: it is stiff at first, and made of the first functions and of the few points only.
 
     Returns:
         coefficients (r, 2), weights (p,), inliers (p,), usual residual of a coordinate.
     """
-    Bs, ws = B[seen], w[:, seen].T
-    finest = FINEST * float(np.sqrt(np.var(ws, axis=0).sum()))
-    h = np.ones(len(Bs))
-    for sweep in range(SWEEPS):
-        firm = max(firmness, 10.0 ** -(sweep + 1))  # gross errors must not bend it
-        gram = (Bs.T * h) @ Bs / h.sum()
-        c = np.linalg.solve(gram + np.diag(firm * stiffness + 1e-12), (Bs.T * h) @ ws / h.sum())
-        off = np.linalg.norm(ws - Bs @ c, axis=1)
-        usual = max(float(np.median(off)) / 1.1774, finest)  # of a Rayleigh distribution
-        h = 1 / (1 + (off / (GROSS * usual)) ** 2) ** 2
+    every = np.flatnonzero(seen)
+    some = every if few is None else spread_rows(seen, few)
+    finest = FINEST * float(np.sqrt(np.var(w[:, some], axis=1).sum()))
+    h, done, c = np.ones(len(some)), 0, np.zeros((0, 2))
+    for rows, r, sweeps in (
+        (some, FEW_FUNCTIONS, ROUGH_SWEEPS),
+        (some, len(stiffness), SWEEPS - 1),
+        (every, len(stiffness), 1),
+    ):
+        Bs, ws = B[rows, :r], w[:, rows].T
+        if done:
+            h = weights_of(ws - Bs[:, : len(c)] @ c, finest)[0]
+        for _ in range(sweeps):
+            done += 1
+            firm = max(firmness, 10.0**-done)
+            weighted = Bs.T * (h / h.sum())
+            gram = weighted @ Bs
+            gram[np.diag_indices(len(gram))] += firm * stiffness[:r] + 1e-12
+            c = np.linalg.solve(gram, weighted @ ws)
+            h, off, usual = weights_of(ws - Bs @ c, finest)
     weights, inlier = np.zeros(len(B)), np.zeros(len(B), bool)
-    weights[seen], inlier[seen] = h, off < GROSS * usual
+    weights[every], inlier[every] = h, off < GROSS * usual
     return c, weights, inlier, usual
+
+
+def weights_of(residual: Array, finest: float) -> tuple[Array, Array, float]:
+    """Geman-McClure weights (n,) of residuals (n, 2), their lengths (n,), and the usual residual of a coordinate."""
+    off = np.sqrt((residual**2).sum(axis=1))
+    usual = max(float(np.partition(off, len(off) // 2)[len(off) // 2]) / 1.1774, finest)  # of a Rayleigh distribution
+    return 1 / (1 + (off / (GROSS * usual)) ** 2) ** 2, off, usual
 
 
 def cross_validated(B: Array, W: Array, weights: Array, stiffness: Array) -> float:
     """Weight of bending that predicts left-out points of all images best: generalised cross validation."""
     score = np.zeros(len(FIRM))
     counts = np.zeros((2, len(FIRM)))
+    held = (FIRM[:, None] * stiffness + 1e-12)[:, :, None] * np.eye(len(stiffness))
     for w, h in zip(W, weights, strict=True):
         seen = h > 0
         Bs, ws, hs = B[seen], w[:, seen].T, h[seen]
         gram, right = (Bs.T * hs) @ Bs / hs.sum(), (Bs.T * hs) @ ws / hs.sum()
-        for k, firm in enumerate(FIRM):
-            held = gram + np.diag(firm * stiffness + 1e-12)
-            solved = np.linalg.solve(held, np.concatenate([right, gram], axis=1))
-            off = ws - Bs @ solved[:, :2]
-            score[k] += (hs[:, None] * off**2).sum()
-            counts[:, k] += hs.sum(), np.trace(solved[:, 2:])
+        inverse = np.linalg.inv(gram + held)
+        off = ws - Bs @ (inverse @ right)
+        score += (hs[:, None] * off**2).sum(axis=(1, 2))
+        counts[0] += hs.sum()
+        counts[1] += (inverse * gram).sum(axis=(1, 2))
     return float(FIRM[np.argmin(score / counts[0] / (1 - counts[1] / counts[0]).clip(1e-3) ** 2)])
 
 

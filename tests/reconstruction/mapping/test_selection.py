@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
-from reconstruction.mapping.selection import Misfit, decide, select, spread_edges
+from reconstruction.mapping.selection import Misfit, decide, select, spread_edges, spread_points
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, SEEDS, flat, relief, rolled, seen, turns
 
 K, P = 16, 100
@@ -17,21 +17,16 @@ def keyframes(rng, shapes, camera=PERSPECTIVE, degrees=25.0, noise=0.2):
     return W + noise * rng.normal(size=W.shape), np.ones((K, P), bool), placed
 
 
-def surface_of(W, placed, rng, off=0.3):
+def surface_of(placed, rng, off=0.3):
     """What a good maker of sheets would find; `off` px."""
-
-    def surface(w, _visible, _camera):
-        frames = [int(np.abs(W - one).sum(axis=(1, 2)).argmin()) for one in w]
-        return placed[frames] + off * rng.normal(size=(len(w), 3, P))
-
-    return surface
+    return lambda parts: [placed[part] + off * rng.normal(size=(len(part), 3, P)) for part in parts]
 
 
 @given(SEEDS)
 @settings(max_examples=3, deadline=None)
 def test_a_solid_is_told(rng):
     W, visible, placed = keyframes(rng, np.repeat(relief(rng, P)[None], K, axis=0))
-    evidence = select(W, visible, PERSPECTIVE, surface_of(W, placed, rng, off=1.0))
+    evidence = select(W, visible, PERSPECTIVE, surface_of(placed, rng, off=1.0))
     assert evidence.kind == "solid"
     assert evidence.sureness > 1.2
     assert evidence.solid.edges_px == pytest.approx(0.2, rel=0.3)
@@ -42,7 +37,7 @@ def test_a_solid_is_told(rng):
 @settings(max_examples=3, deadline=None)
 def test_a_card_that_turns_is_flat(rng):
     W, visible, placed = keyframes(rng, np.repeat(flat(rng, P)[None], K, axis=0))
-    assert select(W, visible, PERSPECTIVE, surface_of(W, placed, rng)).kind == "flat"
+    assert select(W, visible, PERSPECTIVE, surface_of(placed, rng)).kind == "flat"
 
 
 @given(SEEDS)
@@ -51,7 +46,7 @@ def test_a_sheet_that_rolls_is_a_sheet(rng):
     sheet = flat(rng, P)
     shapes = np.stack([rolled(sheet, 0.008 * np.sin(k)) for k in range(K)])
     W, visible, placed = keyframes(rng, shapes)
-    evidence = select(W, visible, PERSPECTIVE, surface_of(W, placed, rng))
+    evidence = select(W, visible, PERSPECTIVE, surface_of(placed, rng))
     assert evidence.kind == "sheet"
     assert evidence.length_change < 0.03  # of edges some 20 px long, with 0.3 px of noise
     assert select(W, visible, PERSPECTIVE).kind != "sheet"  # nothing makes one
@@ -91,7 +86,7 @@ def test_edges_join_neighbours_seen_often():
     rng = np.random.default_rng(0)
     W, visible, _ = keyframes(rng, np.repeat(relief(rng, P)[None], K, axis=0))
     visible[2:, :10] = False
-    edges = spread_edges(W, visible)
+    edges = spread_edges(W, visible, spread_points(W, visible))
     assert (edges[:, 0] < edges[:, 1]).all()
     assert edges.min() >= 10
 

@@ -12,7 +12,7 @@ def test_smooth_images_are_nearer_to_the_truth_than_the_observations() -> None:
     W, S = waving_sheet(np.random.default_rng(1), points=250, amplitude=0.3, noise_px=0.5)
     warps = smooth_warps(W, np.ones((12, 250), bool))
     true = CAMERA.project(S)
-    rms = [np.sqrt(((w - true) ** 2).mean()) for w in (W, warps.images(warps.reference))]
+    rms = [np.sqrt(((w - true) ** 2).mean()) for w in (W, warps.images())]
     assert rms[1] < 0.7 * rms[0]
     assert np.median(warps.noise_px) == pytest.approx(0.5, rel=0.25)
 
@@ -32,7 +32,7 @@ def test_what_is_far_from_all_visible_points_is_uncertain() -> None:
     visible = np.ones((12, 200), bool)
     visible[4] = W[0, 0] < np.median(W[0, 0])
     warps = smooth_warps(np.where(visible[:, None], W, np.nan), visible)
-    variance = warps.variance(warps.reference)[4]
+    variance = warps.variance()[4]
     assert np.median(variance[~visible[4]]) > 10 * np.median(variance[visible[4]])
 
 
