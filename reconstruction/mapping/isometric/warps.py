@@ -7,6 +7,7 @@ import numpy as np
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
+from reconstruction.mapping.outliers import without_outliers
 
 FUNCTIONS = 100  # of the field that an image is made of
 ROUGH_FUNCTIONS = 20  # of the one that only says where a point would be in the reference image
@@ -81,7 +82,7 @@ class Warps:
 def smooth_warps(W: Array, visible: Mask) -> Warps:
     """Smooth images of W (F, 2, p) px, by visibility (F, p)."""
     F, _, p = W.shape
-    reference = reference_image(W, visible)
+    reference = reference_image(W, without_outliers(W, visible))  # one where few are seen would bend the map to it
     placed: Mask = np.isfinite(reference[0])
     few = np.flatnonzero(placed)[farthest_points(reference[:, placed].T, FEW)]
     field = smooth_field(reference[:, few[:NODES]], FUNCTIONS)
