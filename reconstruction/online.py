@@ -1,9 +1,8 @@
 """The on-line estimator: one observation in, the shapes it settles out (paper §5)."""
 
-from dataclasses import replace
+from collections import deque
+from dataclasses import dataclass
 from enum import Enum
-
-import numpy as np
 
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
@@ -13,19 +12,15 @@ from reconstruction.basis.model import Model, build_model
 from reconstruction.basis.rest_shape import RestShape, scaled_to
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
-from reconstruction.mapping import focal, rest_shape
-from reconstruction.mapping.evidence import TURN_DEGREES, weigh
-from reconstruction.mapping.factorization import view_turn_degrees
-from reconstruction.mapping.keyframes import Keyframes
-from reconstruction.mapping.map import Map, map_of, ratio_of_sizes
-from reconstruction.mapping.outliers import without_outliers
+from reconstruction.mapping.map import Map, ratio_of_sizes
+from reconstruction.mapping.mapper import Mapper
 from reconstruction.settings import Deformation, Metric, Settings
 from reconstruction.window import priors
 from reconstruction.window.energy import build_energy, build_guides
 from reconstruction.window.priors import Weights
 from reconstruction.window.window import SlidingWindow
 
-BOOTSTRAP_SCHEDULE = (10, 15, 20, 30, 45, 60)  # frames after which a rigid shape is looked for; the last decides
+CATCH_UP = 4  # most frames whose shapes are found with one observation, while others wait
 
 
 class Phase(Enum):
@@ -36,47 +31,62 @@ class Phase(Enum):
     LOST = "lost"
 
 
+@dataclass(frozen=True)
+class Waiting:
+    """A frame that has no shape yet: points (2, p) px, visible (p,), and whether the surface was lost before it."""
+
+    W: Array
+    visible: Mask
+    restart: bool
+
+
 class Reconstruction:
-    """From observations to shapes, frame by frame: bootstrap first, then a sliding window.
+    """From observations to shapes, frame by frame: a first model, then a sliding window, and better models on the way.
 
     Args:
         camera: the camera, its focal length perhaps only assumed; the paper's energy needs an orthographic one.
         settings: how to reconstruct.
         given: a rest shape (3, p) from elsewhere.
         mesh: its mesh, if it has one.
+        mapper: what finds the models; by itself one that makes them at once.
 
     Attributes:
-        map: what the keyframes said the object is; None while the first frames' word stands.
-        rest: the rest shape, once there is one.
-        window: the sliding window, once there is a rest shape.
-        bootstrap_frames: frames the bootstrap took.
+        map: what the object is, as far as is known; None before there is a model.
+        camera: with the focal length in force.
+        window: the sliding window, once there is a model.
+        bootstrap_frames: frames that gave the first model.
         metric: the dissimilarity in force; None until the rest shape decides.
         deformation: the constraint in force; auto until the rest shape decides.
-        focal_note: what the first frames say about the focal length, in words; empty if they were not asked.
+        revisions: how often another model replaced the one before.
     """
 
     def __init__(
-        self, camera: Camera, settings: Settings, given: RestShape | None = None, mesh: Mesh | None = None
+        self,
+        camera: Camera,
+        settings: Settings,
+        given: RestShape | None = None,
+        mesh: Mesh | None = None,
+        mapper: Mapper | None = None,
     ) -> None:
         if settings.energy == "paper" and camera.perspective:
             raise ReconstructionError("energy paper needs an orthographic camera", "energy")
         self.camera, self.settings = camera, settings
-        self.rest = given
         self.map: Map | None = None
-        maps = given is None and settings.rest_shape == "auto" and settings.energy != "paper"
-        self._keyframes = Keyframes() if maps else None
-        self._frame = -1
+        self._given = given
+        self._mapper = (mapper or Mapper(settings)) if given is None else None
         self._mesh = mesh
         self.window: SlidingWindow | None = None
         self.bootstrap_frames = 0
         self.metric: Metric | None = None
         self.deformation: Deformation = settings.deformation
-        self.focal_note = ""
-        self._waiting: list[tuple[Array, Mask]] = []
+        self.revisions = 0
+        self._waiting: deque[Waiting] = deque()
+        self._last: ShapeEstimate | None = None
+        self._restart = False
 
     @property
     def phase(self) -> Phase:
-        """Bootstrapping until there is a rest shape, tracking afterwards."""
+        """Bootstrapping until there is a model, tracking afterwards."""
         return Phase.BOOTSTRAP if self.window is None else Phase.TRACKING
 
     @property
@@ -85,6 +95,16 @@ class Reconstruction:
         if self.window is None:
             raise ReconstructionError("there is no rest shape yet: the bootstrap is not over")
         return self.window.model
+
+    @property
+    def rest(self) -> RestShape | None:
+        """The rest shape, once there is one."""
+        return self.map.rest if self.map else self._given
+
+    @property
+    def focal_note(self) -> str:
+        """How the focal length was found, in words; empty if it was not looked for."""
+        return self.map.focal_note if self.map else ""
 
     @property
     def focal_words(self) -> dict[str, float | str | None]:
@@ -101,8 +121,8 @@ class Reconstruction:
         return priors.weights(self.settings.priors, self.deformation, perspective=self.camera.perspective, paper=paper)
 
     def predict(self) -> Array | None:
-        """Where the next frame will see the points, (p, 2) px at constant velocity; None while bootstrapping."""
-        return None if self.window is None else self.window.predict()
+        """Where the next frame will see the points, (p, 2) px at constant velocity; None while frames wait for shapes."""
+        return None if self.window is None or self._waiting else self.window.predict()
 
     def update(self, W: Array, visible: Mask) -> list[ShapeEstimate]:
         """Take one frame's points (2, p) px with visibility (p,); returns the shapes now known, oldest first.
@@ -110,107 +130,82 @@ class Reconstruction:
         Raises:
             ReconstructionError: no rest shape can be had from the frames so far.
         """
-        self._frame += 1
-        if self._keyframes is not None:
-            self._keyframes.offer(self._frame, W, visible)
-        if self.window is not None:
-            if self.map is None or self.deformation != "inextensible":
-                return [self.window.advance(W, visible)]
-            expected = self.map.expected(self.window.model, W, visible, self.window.state)
-            return [self.window.advance(W, visible, expected)]
         if self.settings.modes >= W.shape[1]:
             problem = f"modes {self.settings.modes} does not fit {W.shape[1]} points: choose fewer"
             raise ReconstructionError(problem, "modes")
-        self._waiting.append((W, visible))
-        n, wanted = len(self._waiting), self.settings.bootstrap_frames
-        if self.rest is not None:
-            return self._start(scaled_to(self.rest, W, visible))
-        if wanted == "auto":
-            if n in BOOTSTRAP_SCHEDULE:
-                return self._decide(last=n == BOOTSTRAP_SCHEDULE[-1])
-        elif n >= wanted:
-            return self._decide(last=True)
-        return []
+        self._waiting.append(Waiting(W, visible, self._restart))
+        self._restart = False
+        oldest = self._waiting[0]
+        found = self._mapper.add(W, visible, self.camera, (oldest.W, oldest.visible)) if self._mapper else None
+        if self._given is not None and self.map is None:
+            found = Map(scaled_to(self._given, W, visible), self.camera)
+        if found is not None:
+            self._adopt(found)
+        return self._advance(CATCH_UP)
 
     def restart(self) -> None:
         """The surface was lost and is seen again, somewhere else: keep the model, forget the last frames."""
-        if self.window is not None:
-            self.window.restart()
+        self._restart = True
+
+    def catch_up(self) -> list[ShapeEstimate]:
+        """The shapes of all frames that wait, if there is a model."""
+        return self._advance(len(self._waiting))
 
     def finish(self) -> list[ShapeEstimate]:
-        """No more frames: settle for what the bootstrap has; returns the shapes of its frames."""
-        return self._decide(last=True) if self.window is None and self._waiting else []
+        """No more frames: settle for what the bootstrap has; returns the shapes of all frames that wait.
+
+        Raises:
+            ReconstructionError: no rest shape can be had from them.
+        """
+        if self.window is None and self._mapper:
+            found = self._mapper.finish(self.camera)
+            if found is not None:
+                self._adopt(found)
+        return self.catch_up()
 
     def revise(self) -> bool:
         """What the object is by keyframes of all frames so far: replace the model, if they tell; whether they do.
 
         Then all frames are worth another pass: the next one to `update` is the first again.
         """
-        if self._keyframes is None or self.window is None:
-            return False
-        W, visible, frames = self._keyframes.spread()
-        self._keyframes = None
-        found = map_of(W, visible, self.camera, estimate_focal=self.settings.estimate_focal)
+        found = self._mapper.final(self.camera) if self._mapper and self.window else None
         if found is None:
             return False
-        found = found.scaled(ratio_of_sizes(self.window.model.basis.rest, found.rest.motion.shape))
-        rest = replace(found.rest, motion=found.rest.motion.in_order(np.argsort(frames)))
-        if self.settings.estimate_focal and found.camera.perspective:
-            self.focal_note = f"focal length {found.camera.focal_px:.0f} px, from {len(W)} keyframes"
-        self.map, self.camera, self.deformation = found, found.camera, self.settings.deformation
-        self._build(rest)
+        self._mapper = self._last = None
+        self._adopt(found)
         return True
 
-    def _decide(self, last: bool) -> list[ShapeEstimate]:
-        W = np.stack([w for w, _ in self._waiting])
-        visible = without_outliers(W, np.stack([v for _, v in self._waiting]))
-        kind = self.settings.rest_shape
-        if kind == "plane":
-            return self._recover("plane", W, visible)
-        if kind == "rigid" and self.settings.bootstrap_frames != "auto":
-            return self._recover("rigid", W, visible)
-        doubt = "there are too few frames for a rigid shape"
-        if len(W) >= BOOTSTRAP_SCHEDULE[0]:
-            doubt = weigh(W, visible).doubt
-            if not doubt:
-                rest = rest_shape.rigid(W, visible, self.camera)
-                turn = view_turn_degrees(rest.motion.R)
-                if kind == "rigid" or turn >= TURN_DEGREES:
-                    return self._recover("rigid", W, visible, rest=rest)
-                # Things that move by themselves pass for parallax until perspective is reckoned with.
-                doubt = f"the object turned {turn:.1f}° in {len(W)} frames, about {TURN_DEGREES:.0f}° are needed"
-        if not last:
+    def _advance(self, most: int) -> list[ShapeEstimate]:
+        """The shapes of at most so many of the frames that wait, oldest first."""
+        if self.window is None:
             return []
-        if kind == "rigid":
-            raise ReconstructionError(f"cannot recover a rest shape: {doubt}", "rest_shape")
-        return self._recover("plane", W, visible, f" (no rigid shape: {doubt})")
+        return [self._shape_of(self._waiting.popleft()) for _ in range(min(most, len(self._waiting)))]
 
-    def _recover(
-        self, kind: str, W: Array, visible: Mask, remark: str = "", rest: RestShape | None = None
-    ) -> list[ShapeEstimate]:
-        """The rest shape of the first frames (F, 2, p), if it is not there yet, by the focal length that they hold."""
-        recovery = rest_shape.rigid if kind == "rigid" else rest_shape.plane
-        rest = rest or recovery(W, visible, self.camera)
-        if self.settings.estimate_focal and self.camera.perspective:
-            found = focal.estimate(W, visible, self.camera, rest, self.deformation, self.settings.priors)
-            self.camera, self.focal_note = replace(self.camera, focal_px=found.focal_px), found.note
-            if found.known:
-                rest = recovery(W, visible, self.camera)
-        return self._start(replace(rest, note=rest.note + remark))
-
-    def _start(self, rest: RestShape) -> list[ShapeEstimate]:
-        """The shapes of the frames that wait, with this rest shape."""
-        self.bootstrap_frames = len(self._waiting)
-        self._build(rest)
+    def _shape_of(self, frame: Waiting) -> ShapeEstimate:
+        """The shape of the next frame."""
         assert self.window is not None
-        waiting, self._waiting = self._waiting, []
-        return [self.window.advance(W, visible) for W, visible in waiting]
+        assert self.map is not None
+        if frame.restart:
+            self.window.restart()
+        expected = None
+        if self.deformation == "inextensible":
+            expected = self.map.expected(self.window.model, frame.W, frame.visible, self.window.state)
+        self._last = self.window.advance(frame.W, frame.visible, expected)
+        return self._last
 
-    def _build(self, rest: RestShape) -> None:
-        """The model and the window of a rest shape."""
-        self.rest = rest
+    def _adopt(self, found: Map) -> None:
+        """Go on with another model, as large as the one before, and from its last shape."""
+        before, last = self.window, self._last
+        if before is None:
+            self.bootstrap_frames = self._mapper.first_frames if self._mapper else 1
+        else:
+            self.revisions += 1
+            found = found.scaled(ratio_of_sizes(before.model.basis.rest, found.rest.motion.shape))
+            if last is not None and not found.camera.perspective:
+                found = found.turned_like(last.shape)
+        self.map, self.camera, rest = found, found.camera, found.rest
         sheet = rest.flat or rest.kind == "isometric"
-        self.deformation = constraints.fitting(self.deformation, flat=sheet)
+        self.deformation = constraints.fitting(self.settings.deformation, flat=sheet)
         self.metric = distances.fitting(self.settings.metric, flat=sheet)
         model = build_model(rest, self.camera, self.settings.modes, self.metric, self._mesh)
         paper = self.settings.energy == "paper"
@@ -218,3 +213,5 @@ class Reconstruction:
         refine = self.settings.refine_rest and not paper and rest.kind != "isometric"
         guides = build_guides(model, self.deformation, paper=paper)
         self.window = SlidingWindow(model, energy, self.settings.window, rest.motion, refine=refine, guides=guides)
+        if before is not None and last is not None:
+            self.window.frames, self.window.state = before.frames, found.state_of(model, last.shape)

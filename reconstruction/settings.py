@@ -44,7 +44,14 @@ class Settings:
     refine_rest: bool = True
     """Let later frames improve the rest shape. Not with the paper's energy."""
     estimate_focal: bool = False
-    """Find the focal length of a perspective camera from the first frames where they hold it."""
+    """Find the focal length of a perspective camera, where the frames hold it."""
+    revise: bool = True
+    """Make the model anew whenever the views have grown; without it the first frames decide for good."""
+
+    @property
+    def maps(self) -> bool:
+        """Whether keyframes say what the object is: not with a chosen rest shape or the paper's energy."""
+        return self.revise and self.rest_shape == "auto" and self.energy != "paper"
 
     def __post_init__(self) -> None:
         if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:

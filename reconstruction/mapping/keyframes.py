@@ -33,6 +33,11 @@ class Keyframes:
         self._visible: list[Mask] = []
         self._apart = np.zeros((0, 0))
 
+    @property
+    def extent(self) -> float:
+        """How far the two that differ most are apart; 0 with fewer than two."""
+        return float(self._apart[np.isfinite(self._apart)].max(initial=0.0))
+
     def offer(self, frame: int, W: Array, visible: Mask) -> bool:
         """Take a frame's points (2, p) px with visibility (p,), if they differ from those there are; whether it was."""
         if visible.mean() < FEWEST_SEEN:

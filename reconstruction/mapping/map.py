@@ -34,12 +34,14 @@ class Map:
         camera: with the focal length that the keyframes hold, else as given.
         sheet: its depths and lengths, if it is a sheet.
         unit_px: pixels of the first keyframe in a unit of the sheet.
+        focal_note: how the focal length was found, in words; empty if it was not looked for.
     """
 
     rest: RestShape
     camera: Camera
     sheet: IsometricSheet | None = None
     unit_px: float = 1.0
+    focal_note: str = ""
 
     def expected(self, model: Model, W: Array, visible: Mask, last: State | None) -> State | None:
         """Pose and Λ' of a sheet in another frame, by its lengths; None for a solid, or with too few points.
@@ -59,6 +61,19 @@ class Map:
             if depth @ (before - before.mean()) < 0:
                 shape[2] -= 2 * depth
         return model.state_of(shape, self.sheet.camera.focal_px, visible, last)
+
+    def state_of(self, model: Model, shape: Array) -> State | None:
+        """Pose and Λ' of a shape (3, p) in camera axes, px, by the modes of a sheet; None for a solid."""
+        if self.sheet is None:
+            return None
+        return model.state_of(shape, self.sheet.camera.focal_px, np.ones(shape.shape[1], np.bool_), None)
+
+    def turned_like(self, shape: Array) -> "Map":
+        """The same or its mirror image, whichever is deep where a shape (3, p) is: seen without perspective, both fit."""
+        motion = self.rest.motion
+        if (motion.R[0] @ motion.shape)[2] @ (shape[2] - shape[2].mean()) >= 0:
+            return self
+        return replace(self, rest=replace(self.rest, motion=motion.mirrored()))
 
     def scaled(self, factor: float) -> "Map":
         """The same, so many times as large, and so many times as far away."""
@@ -82,14 +97,18 @@ def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool) -> Map
         seen_by = lens(camera, W)
         halves = Halves(W, visible, seen_by)
         evidence = select(W, visible, camera, halves.shapes)
+        if evidence.kind == "flat":
+            return None
         if evidence.kind == "sheet":  # before a long lens one half does not tell whether another is its mirror image
-            found = halves.whole() if camera.perspective else sheet(W, visible, seen_by)
-            return sheet_map(camera, found, evidence, estimate_focal=estimate_focal)
-        if evidence.kind == "solid":
-            return solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal)
+            surface = halves.whole() if camera.perspective else sheet(W, visible, seen_by)
+            found = sheet_map(camera, surface, evidence, estimate_focal=estimate_focal)
+        else:
+            found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal)
     except ReconstructionError:
-        pass
-    return None
+        return None
+    if not (estimate_focal and camera.perspective):
+        return found
+    return replace(found, focal_note=f"focal length {found.camera.focal_px:.0f} px, from {len(W)} keyframes")
 
 
 def lens(camera: Camera, W: Array) -> Camera:
