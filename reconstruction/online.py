@@ -57,7 +57,7 @@ class Reconstruction:
         bootstrap_frames: frames that gave the first model.
         metric: the dissimilarity in force; None until the rest shape decides.
         deformation: the constraint in force; auto until the rest shape decides.
-        revisions: how often another model replaced the one before.
+        revisions: how often another model replaced the one before, on the way.
     """
 
     def __init__(
@@ -140,6 +140,7 @@ class Reconstruction:
         if self._given is not None and self.map is None:
             found = Map(scaled_to(self._given, W, visible), self.camera)
         if found is not None:
+            self.revisions += self.window is not None
             self._adopt(found)
         return self._advance(CATCH_UP)
 
@@ -199,7 +200,6 @@ class Reconstruction:
         if before is None:
             self.bootstrap_frames = self._mapper.first_frames if self._mapper else 1
         else:
-            self.revisions += 1
             found = found.scaled(ratio_of_sizes(before.model.basis.rest, found.rest.motion.shape))
             if last is not None and not found.camera.perspective:
                 found = found.turned_like(last.shape)

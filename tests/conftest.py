@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from app.recording.environment import environment
+from app.environment import environment
 
 os.environ.update(environment())
 

@@ -13,6 +13,7 @@ from typing import Annotated, Any, NoReturn
 
 import tyro
 
+from app.environment import environment
 from app.options.batch import Batch
 from app.options.bench import Bench
 from app.options.evaluate import Evaluate
@@ -22,7 +23,6 @@ from app.options.reproduce import Reproduce
 from app.options.retexture import Retexture
 from app.options.review import Review
 from app.options.run import Demo, Run
-from app.recording.environment import environment
 from app.terminal.errors import UsageError, in_a_line
 from app.terminal.exit_code import ExitCode
 

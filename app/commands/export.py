@@ -57,7 +57,7 @@ def export(command: Export, progress: Progress) -> Exported:
     out = command.out or default_path(command.recording, kind)
     if kind in FOLDERS:
         check_free_folder(out, overwrite=command.overwrite)
-    playback = Playback.load(command.recording)
+    playback = Playback.load(command.recording, online=command.online)
     for note in playback.notes:
         progress.log(note)
     _ = playback.model  # a UsageError if there is none
@@ -104,8 +104,8 @@ def write_glb(playback: Playback, out: Path) -> None:
     from app.files.gltf import MovingMesh, glb
 
     camera, (width, height) = playback.camera, playback.size
-    s = held(playback.s)
-    t = held(playback.t)
+    s = held(playback.estimates.s)
+    t = held(playback.estimates.t)
     if camera.perspective:
         origin = np.column_stack([t, np.full(len(t), camera.focal_px)]) / s[:, None]
         scale = np.ones(len(s))
@@ -118,10 +118,10 @@ def write_glb(playback: Playback, out: Path) -> None:
         uv=texture_coordinates(playback),
         texture_bgr=playback.texture_bgr,
         times_s=playback.times_s,
-        quaternion=held(playback.quaternion),
+        quaternion=held(playback.estimates.quaternion),
         origin=origin,
         scale=scale,
-        Lambda=held(playback.Lambda),
+        Lambda=held(playback.estimates.Lambda),
         field_of_view=view,
     )
     with writable(out) as file:

@@ -65,7 +65,9 @@ def review(command: Review, progress: Progress) -> Comparison:
         from app.recording.viewer import running_viewer
 
         url = running_viewer(command.connect)
-    playbacks = [Playback.load(path) for path in (command.recording, command.other) if path is not None]
+    playbacks = [
+        Playback.load(path, online=command.online) for path in (command.recording, command.other) if path is not None
+    ]
     for playback in playbacks:
         for note in playback.notes:
             progress.log(note)

@@ -6,12 +6,12 @@ from typing import Literal
 
 import tyro
 
-from app.options.shared import Json, Overwrite
+from app.options.shared import Json, Online, Overwrite
 from app.terminal.errors import UsageError
 
 
 @dataclass(frozen=True)
-class Export(Json, Overwrite):
+class Export(Json, Overwrite, Online):
     """A recording as files for other programs, from the .rrd alone.
 
     Formats:

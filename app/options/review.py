@@ -5,11 +5,11 @@ from pathlib import Path
 
 import tyro
 
-from app.options.shared import Json, Overwrite
+from app.options.shared import Json, Online, Overwrite
 
 
 @dataclass(frozen=True)
-class Review(Json, Overwrite):
+class Review(Json, Overwrite, Online):
     """What is in a recording: a table, JSON, CSV, a figure, or the viewer; of two recordings side by side.
 
     As JSON, the facts of two are a list in "recordings".

@@ -25,6 +25,8 @@ class Output(Json, Overwrite):
     split_minutes: float | None = None
     """Start another recording after so many minutes of video: NAME.rrd, NAME-part2.rrd, … Each is complete in itself. With
     another object, one is started in any case."""
+    keep_online: bool = False
+    """Keep the shapes as they were shown on the way in the recording, too: beside those of the final pass."""
     image: Literal["jpeg", "video", "none"] = "jpeg"
     """How frames are stored in the recording: each as JPEG, the video file as it is, or not at all."""
     view: bool = False
@@ -109,10 +111,14 @@ class Run(FinalPass, Source):
     output: tyro.conf.OmitArgPrefixes[Output] = Output()
 
     @property
+    def live(self) -> bool:
+        """Whether frames come from a camera or stream, which do not wait."""
+        return self.source.isdigit() or "://" in self.source
+
+    @property
     def passes(self) -> bool:
         """Whether frames are kept for a final pass: those of a file, whose recording stays one file."""
-        live = self.source.isdigit() or "://" in self.source
-        return self.final_pass and not live and self.output.split_minutes is None
+        return self.final_pass and not self.live and self.output.split_minutes is None
 
     @property
     def json(self) -> bool:

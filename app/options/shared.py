@@ -41,3 +41,11 @@ class FinalPass:
 
     final_pass: bool = True
     """Reconstruct all frames once more with what is known of the surface at the end; not of cameras and streams."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Online:
+    """Which shapes of a recording are meant."""
+
+    online: bool = False
+    """The shapes as they were shown on the way, before the final pass, if the run was told to --keep-online."""

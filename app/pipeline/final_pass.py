@@ -15,6 +15,7 @@ def final_pass(tracked: TrackedObject, recording: RecordingProcess, progress: Pr
         with completed():
             for count, shape in enumerate(tracked.revised()):
                 if count == 0:
+                    recording.tell("final_pass")
                     for note in tracked.notes:
                         progress.log(note)
                         recording.tell("event", shape.index, shape.time_s, note)

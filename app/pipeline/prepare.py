@@ -1,6 +1,6 @@
 """What a run begins with: the points of the first frame, and the estimator with the camera they are seen by."""
 
-from dataclasses import replace
+from dataclasses import fields
 from pathlib import Path
 from typing import cast, get_args
 
@@ -13,6 +13,7 @@ from app.files.mesh_file import rest_of_surface
 from app.options.model import Model
 from app.options.run import Run
 from reconstruction.camera import Camera
+from reconstruction.mapping.mapper import Mapper, Start
 from reconstruction.online import Reconstruction
 from reconstruction.settings import RecoveredRestShape, Settings
 from tracking.features import detect_corners
@@ -22,8 +23,8 @@ from tracking.video import Frame
 RECOVERED = get_args(RecoveredRestShape)  # rest shapes that come from the first frames
 
 
-def prepared(config: Run, first: Frame) -> tuple[Array, Reconstruction]:
-    """Corners (P, 2) px of the first frame, and the estimator before it has seen one.
+def prepared(config: Run, first: Frame, start: Start) -> tuple[Array, Reconstruction]:
+    """Corners (P, 2) px of the first frame, and the estimator before it has seen one, whose models are made by `start`.
 
     Raises:
         UsageError, TrackingError: a region, mask or mesh that does not fit the picture, or too few corners.
@@ -37,7 +38,8 @@ def prepared(config: Run, first: Frame) -> tuple[Array, Reconstruction]:
     camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
     settings = settings_of(model, config.rest_shape, estimate_focal=not isinstance(model.focal, float))
     if config.rest_shape in RECOVERED:
-        return points_px, Reconstruction(camera, settings)
+        mapper = Mapper(settings, start, wait=not config.live)
+        return points_px, Reconstruction(camera, settings, mapper=mapper)
     given, inside = rest_of_surface(Path(config.rest_shape), points_px, camera)
     return points_px[inside], Reconstruction(camera, settings, given)
 
@@ -45,4 +47,5 @@ def prepared(config: Run, first: Frame) -> tuple[Array, Reconstruction]:
 def settings_of(model: Model, rest_shape: str, *, estimate_focal: bool) -> Settings:
     """The estimator's settings with what a command decides by itself; a rest shape from elsewhere overrides them."""
     recovered = cast(RecoveredRestShape, rest_shape) if rest_shape in RECOVERED else "auto"
-    return replace(model, rest_shape=recovered, estimate_focal=estimate_focal)
+    chosen = {one.name: getattr(model, one.name) for one in fields(Settings)}  # another process reads them without options
+    return Settings(**chosen | {"rest_shape": recovered, "estimate_focal": estimate_focal})

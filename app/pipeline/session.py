@@ -13,6 +13,7 @@ from app.files.writing import check_free
 from app.options.run import Run
 from app.pipeline.counts import Counts
 from app.pipeline.final_pass import final_pass
+from app.pipeline.map_process import MapProcess
 from app.pipeline.prefetch import Prefetch
 from app.pipeline.processed import InOrder, Processed, Surface
 from app.pipeline.stopwatch import Stopwatch
@@ -76,7 +77,7 @@ class Session:
         video = Video(
             config.source, *config.frame_range, duration_s=config.duration, drop_late=config.drop_late, log=self._told
         )
-        with threadpool_limits(1), video:
+        with threadpool_limits(1), video, MapProcess() as self._maps:
             source = iter(video)
             first, second = next(source), next(source, None)
             if second is None:
@@ -84,7 +85,7 @@ class Session:
                     f"{config.source} gives only one frame: a shape shows in how it moves; give a video, or more --frames"
                 )
             self.fps = video.fps
-            self._object = self._first_object = TrackedObject(config, first, self._watch)
+            self._object = self._first_object = TrackedObject(config, first, self._watch, self._maps.begin)
             self._path = output.out or (free_name(RECORDINGS, config.source) if self._record_unnamed else None)
             needed = bool(self._path or output.connect or output.view)
             self._wanted_again = needed or bool(output.shapes_out or config.ground_truth)
@@ -144,7 +145,7 @@ class Session:
             return
         if guarded.change is Change.LOST:
             config = options_for_another(self._config, self._counts.objects + 1)
-            self._successor = Successor(config, frame, self._watch, cut=guarded.cut)
+            self._successor = Successor(config, frame, self._watch, self._maps.begin, cut=guarded.cut)
         else:
             self._successor = None
         self._note(frame.index, frame.time_s, f"{guarded.change.value} at frame {frame.index}: {guarded.reason}", "WARN")
@@ -169,9 +170,9 @@ class Session:
         self._progress.advance(tracked.phase.value, tracked.collected.last_rms_px)
 
     def _record(self, shapes: list[FrameShape]) -> None:
-        """Record shapes; with the first of them, the model."""
-        if shapes and self._surface is None:
-            self._begin_surface(shapes[-1].index, shapes[-1].time_s)
+        """Record shapes; with the first of a model, the model."""
+        if shapes and (self._surface is None or self._surface.model is not self._object.reconstruction.model):
+            self._begin_surface(shapes[0].index, shapes[0].time_s)
         for shape in shapes:
             index, time_s, estimate = shape.index, shape.time_s, shape.estimate
             self._recording.tell("estimate", index, time_s, estimate)
@@ -180,10 +181,11 @@ class Session:
             self._order.shape(index, estimate, self._surface)
 
     def _begin_surface(self, index: int, time_s: float) -> None:
-        """The model of the object is known: record it, and how its rest shape was found."""
+        """A model of the object is known: record it, and how its rest shape was found."""
+        revised = "" if self._surface is None else f"another model from frame {index} on: "
         self._surface = self._object.surface
         for note in self._object.notes:
-            self._note(index, time_s, note)
+            self._note(index, time_s, revised + note)
         self._recording.tell("rest", *self._surface.recorded)
 
     def _end_object(self, *, last: bool) -> None:

@@ -10,6 +10,7 @@ from app.pipeline.prepare import RECOVERED
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
 from reconstruction import ReconstructionError
+from reconstruction.mapping.mapper import Start
 from reconstruction.online import Phase
 from tracking import TrackingError
 from tracking.klt import Observation
@@ -31,16 +32,17 @@ class Successor:
         lost: the frame in which the object was lost.
         cut: whether that was a cut.
         watch: to time it.
+        start: where models are made.
 
     Attributes:
         lost: the same.
         found: the other object, once it has a model.
     """
 
-    def __init__(self, config: Run, lost: Frame, watch: Stopwatch, *, cut: bool) -> None:
+    def __init__(self, config: Run, lost: Frame, watch: Stopwatch, start: Start, *, cut: bool) -> None:
         self.lost = lost
         self.found: TrackedObject | None = None
-        self._config, self._watch = config, watch
+        self._config, self._watch, self._start = config, watch, start
         self._due_s = lost.time_s + (AFTER_CUT_S if cut else AFTER_COVER_S)
         self._tried: TrackedObject | None = None
         self._moves = False
@@ -60,7 +62,7 @@ class Successor:
         try:
             if self._tried is None:
                 with self._watch.time("track"):
-                    self._tried, self._moves = TrackedObject(self._config, frame, self._watch), False
+                    self._tried, self._moves = TrackedObject(self._config, frame, self._watch, self._start), False
             good = self._goes_on(self._tried, frame)
         except (TrackingError, ReconstructionError):
             good = False

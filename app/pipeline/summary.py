@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from app.pipeline.counts import Counts
 from app.pipeline.estimates import Scores
@@ -31,6 +32,8 @@ class RunSummary(Summary):
         focal_note: how it was found.
         branch_switches: how often the window took another branch.
         reprojection_rms_px: over all visible points of all frames.
+        revisions: how often another model replaced the one before, on the way.
+        shapes: whether what came out is of the final pass, or as it was shown on the way.
         score: errors against the truth.
         e3d_online: the error of what was shown on the way, if there was another pass.
         visible_share: of the points, mean over the frames.
@@ -60,6 +63,8 @@ class RunSummary(Summary):
     focal_note: str | None = None
     branch_switches: int
     reprojection_rms_px: float | None
+    revisions: int
+    shapes: Literal["final pass", "on-line"]
     score: Scores | None = None
     e3d_online: float | None = None
     visible_share: float | None
@@ -108,6 +113,8 @@ def summary_of(
         focal_note=reconstruction.focal_note or None,
         branch_switches=collected.switches,
         reprojection_rms_px=collected.reprojection_rms_px,
+        revisions=reconstruction.revisions,
+        shapes="on-line" if tracked.online is None else "final pass",
         score=tracked.score(tracked.collected),
         e3d_online=online.e3d if online else None,
         visible_share=counts.visible_share,

@@ -16,6 +16,7 @@ from app.pipeline.prepare import prepared
 from app.pipeline.processed import Surface
 from app.pipeline.stopwatch import Stopwatch
 from reconstruction.estimate import ShapeEstimate
+from reconstruction.mapping.mapper import Start
 from reconstruction.online import Phase
 from tracking.guarded import Change, Guarded, GuardedTracker
 from tracking.klt import Observation
@@ -41,6 +42,7 @@ class TrackedObject:
         config: what the person asked for.
         first: that frame.
         watch: to time it.
+        start: where its models are made.
 
     Attributes:
         config, first: the same.
@@ -53,13 +55,13 @@ class TrackedObject:
         UsageError, TrackingError: a region, mask, mesh or truth that does not fit, or too few corners.
     """
 
-    def __init__(self, config: Run, first: Frame, watch: Stopwatch) -> None:
+    def __init__(self, config: Run, first: Frame, watch: Stopwatch, start: Start) -> None:
         self.config, self.first, self._watch = config, first, watch
         self._truth = Truth.load(config.ground_truth) if config.ground_truth else None
         self.collected = self._nothing()
         self.online: Collected | None = None
         self._texture = first_picture(config.texture) if config.texture else None
-        self.points_px, self.reconstruction = prepared(config, first)
+        self.points_px, self.reconstruction = prepared(config, first, start)
         self._tracker = GuardedTracker(first.image, self.points_px)
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
         stored = config.passes or config.output.tracks_out
@@ -104,6 +106,7 @@ class TrackedObject:
             "image": output.image,
             "video": Path(self.config.source),
             "overwrite": output.overwrite,
+            "keep_online": output.keep_online and self.config.passes,
         }
 
     def recorded(self, frame: Frame) -> Frame:
@@ -125,7 +128,7 @@ class TrackedObject:
         return guarded
 
     def shape(self, frame: Frame, observation: Observation) -> list[FrameShape]:
-        """The shapes known with this frame, oldest first; none while the object is lost: better than a wrong one.
+        """The shapes known with this frame, oldest first; none of it while the object is lost.
 
         Raises:
             ReconstructionError: no rest shape can be had.
@@ -134,7 +137,7 @@ class TrackedObject:
             self._stored.add(StoredFrame(frame.index, frame.time_s, observation, self.lost))
         if self.lost:
             self.collected.lose(frame.index)
-            return []
+            return self._of_frames(self.reconstruction.catch_up())
         self._times[frame.index] = frame.time_s
         with self._watch.time("reconstruct"):
             return self._of_frames(self.reconstruction.update(observation.points_px.T, observation.visible))

@@ -90,7 +90,7 @@ def facts(playback: Playback, measured: Measures) -> Facts:
         deformation=summary.get("deformation", configuration.get("deformation")),
         points=playback.visible.shape[1],
         metric=summary.get("metric", configuration.get("metric")),
-        modes=playback.Lambda.shape[2] if playback.recorded_model else configuration.get("modes"),
+        modes=playback.estimates.Lambda.shape[2] if playback.recorded_model else configuration.get("modes"),
         visible_share={
             "mean": float(measured.visible_share.mean()),
             "min": float(measured.visible_share.min()),

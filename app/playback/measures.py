@@ -93,15 +93,15 @@ def measures(playback: Playback) -> Measures:
 
 def per_frame(one: Reviewed) -> dict[str, list[object]]:
     """Columns with one entry per frame; NaN as None."""
-    playback, measured = one.playback, one.measured
+    playback, poses, measured = one.playback, one.playback.estimates, one.measured
     numbers: dict[str, Array] = {
         "visible_share": measured.visible_share,
         "error_rms_px": measured.rms_px,
         "error_mean_px": measured.mean_px,
         **{f"error_{name}_px": measured.errors(q) for name, q in (("median", 50), ("p95", 95), ("max", 100))},
         **{f"{stage}_ms": values for stage, values in playback.stage_ms.items()},
-        **dict(zip(PARAMETERS, (*playback.quaternion.T, *playback.t.T, playback.s), strict=True)),
-        **{f"Lambda_{row}_px": np.linalg.norm(playback.Lambda[:, k], axis=1) for k, row in enumerate(ROW_NAMES)},
+        **dict(zip(PARAMETERS, (*poses.quaternion.T, *poses.t.T, poses.s), strict=True)),
+        **{f"Lambda_{row}_px": np.linalg.norm(poses.Lambda[:, k], axis=1) for k, row in enumerate(ROW_NAMES)},
     }
     return {
         "recording": [one.label] * len(playback.frames),

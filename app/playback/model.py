@@ -1,6 +1,7 @@
-"""The model of a recording, with its texture."""
+"""The models of a recording, and the last one's texture."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import cast
 
 import numpy as np
@@ -36,25 +37,36 @@ class RecordedModel:
     texture_origin: Indices
 
 
-def read_model(rows: Rows) -> RecordedModel | None:
-    """Model and texture, or None if the recording does not have both."""
-    if not rows.last(entities.MODEL, f"{MODEL}rest") or not rows.last(entities.MESH, f"{TEXTURE}buffer"):
+def read_models(rows: Rows) -> list[Model]:
+    """The models of a recording, in the order of their numbers."""
+    models: list[Model] = []
+    while rows.last(entity := f"{entities.MODEL}/{len(models)}", f"{MODEL}rest"):
+        value = partial(static, rows, entity)
+        rest = value("rest").reshape(3, -1)
+        Upsilon = value("Upsilon").reshape(-1, rest.shape[1])
+        basis = ModalBasis(rest, Upsilon, value("eigenvalues"), value("Phi").reshape(3, 3))
+        faces, edges = (value(name).reshape(-1, width).astype(np.int64) for name, width in (("faces", 3), ("edges", 2)))
+        models.append(Model(basis, Mesh(faces, edges), Camera(float(value("focal_px")[0]), value("center_px"))))
+    return models
+
+
+def with_texture(rows: Rows, models: list[Model]) -> RecordedModel | None:
+    """The last of the models with its texture, or None if the recording does not have both."""
+    if not models or not rows.last(entities.MESH, f"{TEXTURE}buffer"):
         return None
-
-    def value(name: str) -> Array:
-        return cast(Array, rows.static(entities.MODEL, f"{MODEL}{name}"))
-
-    rest = value("rest").reshape(3, -1)
-    basis = ModalBasis(rest, value("Upsilon").reshape(-1, rest.shape[1]), value("eigenvalues"), value("Phi").reshape(3, 3))
-    faces, edges = (value(name).reshape(-1, width).astype(np.int64) for name, width in (("faces", 3), ("edges", 2)))
-    camera = Camera(float(value("focal_px")[0]), value("center_px"))
+    value = partial(static, rows, f"{entities.MODEL}/{len(models) - 1}")
     layout = cast(list[dict[str, int]], rows.static(entities.MESH, f"{TEXTURE}format"))[0]
     rgb = np.frombuffer(cast(bytes, rows.static(entities.MESH, f"{TEXTURE}buffer")), np.uint8)
     width, height = value("size").astype(int).tolist()
     return RecordedModel(
-        model=Model(basis, Mesh(faces, edges), camera),
+        model=models[-1],
         size=(width, height),
         texture_px=value("texture_px").reshape(-1, 2),
         texture_bgr=rgb.reshape(layout["height"], layout["width"], 3)[:, :, ::-1].copy(),
         texture_origin=value("texture_origin").astype(np.int64),
     )
+
+
+def static(rows: Rows, entity: str, name: str) -> Array:
+    """A component of a model."""
+    return cast(Array, rows.static(entity, f"{MODEL}{name}"))

@@ -14,19 +14,17 @@ import numpy as np
 from app.arrays import Array, Flags, Image, Indices
 from app.playback.chunks import RecordingFile
 from app.playback.documents import DOCUMENT, NAME, SCALARS, document, events, recording_name, stages
+from app.playback.estimates import ESTIMATE, Estimates, read_estimates
 from app.playback.images import stored_images
-from app.playback.model import MODEL, TEXTURE, RecordedModel, read_model
+from app.playback.model import MODEL, TEXTURE, RecordedModel, read_models, with_texture
 from app.playback.observations import OBSERVATION, POSITIONS, read_observations
 from app.recording import entities
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model
 from reconstruction.basis.modes import ModalBasis
-from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
-from reconstruction.state import State
-
-ESTIMATE = "modeshape.Estimate:"
 
 
 @dataclass(frozen=True)
@@ -47,10 +45,7 @@ class Playback:
         events: (frame, time_s, level, text) of what happened.
         W: (F, 2, P) observed px, NaN where not visible.
         visible: (F, P) whether a point was seen.
-        quaternion: (F, 4) w first; NaN in frames without a shape, as for all that follow.
-        t: (F, 2) px.
-        s: (F,).
-        Lambda: (F, 3, r) px; r = 0 without a model.
+        estimates: pose and Λ of every frame.
         recorded_model: model and texture; None if the run ended before its rest shape was found.
     """
 
@@ -67,23 +62,24 @@ class Playback:
     events: list[tuple[int, float, str, str]]
     W: Array
     visible: Flags
-    quaternion: Array
-    t: Array
-    s: Array
-    Lambda: Array
+    estimates: Estimates
     recorded_model: RecordedModel | None
     file: RecordingFile
 
     @classmethod
-    def load(cls, path: Path) -> Self:
+    def load(cls, path: Path, *, online: bool = False) -> Self:
         """Read a recording: complete, of a run that was killed, or cut off.
 
+        Args:
+            path: its file.
+            online: whether the estimates are wanted that were shown on the way, before a final pass.
+
         Raises:
-            UsageError: it is missing, not a recording, not one of ours, or without a single frame.
+            UsageError: it is missing, not a recording, not one of ours, or without a single frame or what is wanted.
         """
         file = RecordingFile(path)
         try:
-            return cls._of(file)
+            return cls._of(file, online=online)
         except (KeyError, TypeError, ValueError, IndexError) as error:
             if isinstance(error, UsageError):
                 raise
@@ -92,21 +88,21 @@ class Playback:
             ) from error
 
     @classmethod
-    def _of(cls, file: RecordingFile) -> Self:
+    def _of(cls, file: RecordingFile, *, online: bool) -> Self:
         rows = file.rows(wanted)
+        entity = entities.ONLINE if online else entities.ESTIMATE
+        if online and not rows.last(entity, f"{ESTIMATE}s"):
+            raise UsageError(f"{file.path} does not hold what was shown on the way: run again with --keep-online")
         observed = read_observations(rows)
         if observed is None:
             raise UsageError(f"{file.path} contains no frame: the run ended before its first, or its start was lost")
-        recorded_model = read_model(rows)
-        modes = len(recorded_model.model.basis.eigenvalues) if recorded_model else 0
+        models = read_models(rows)
+        recorded_model = with_texture(rows, models)
         numbers = observed.frames.tolist()
 
-        def by_frame(entity: str, component: str, width: int) -> Array:
-            values, found = np.full((len(numbers), width), np.nan), rows.last(entity, component)
-            for i, frame in enumerate(numbers):
-                if frame in found:
-                    values[i] = cast(Array, found[frame].value)
-            return values
+        def milliseconds(stage: str) -> Array:
+            found = rows.last(f"{entities.TIMING}/{stage}", SCALARS)
+            return np.array([cast(Array, found[frame].value)[0] if frame in found else np.nan for frame in numbers])
 
         configuration, version = document(rows, entities.CONFIGURATION)
         summary = document(rows, entities.SUMMARY)[0]
@@ -127,14 +123,11 @@ class Playback:
             frames=observed.frames,
             times_s=observed.times_s,
             phases=observed.phases,
-            stage_ms={stage: by_frame(f"{entities.TIMING}/{stage}", SCALARS, 1)[:, 0] for stage in stages(rows)},
+            stage_ms={stage: milliseconds(stage) for stage in stages(rows)},
             events=events(rows),
             W=observed.W,
             visible=observed.visible,
-            quaternion=by_frame(entities.ESTIMATE, f"{ESTIMATE}quaternion", 4),
-            t=by_frame(entities.ESTIMATE, f"{ESTIMATE}t", 2),
-            s=by_frame(entities.ESTIMATE, f"{ESTIMATE}s", 1)[:, 0],
-            Lambda=by_frame(entities.ESTIMATE, f"{ESTIMATE}Lambda", 3 * modes).reshape(len(numbers), 3, modes),
+            estimates=read_estimates(rows, entity, numbers, models if recorded_model else []),
             recorded_model=recorded_model,
             file=file,
         )
@@ -182,7 +175,7 @@ class Playback:
     @cached_property
     def shaped(self) -> Flags:
         """Which frames (F,) have a shape."""
-        return np.asarray(np.isfinite(self.s))
+        return np.asarray(np.isfinite(self.estimates.s))
 
     def estimate(self, i: int) -> ShapeEstimate | None:
         """Shape and pose of the frame in row i; None if it has none.
@@ -191,12 +184,7 @@ class Playback:
             UsageError: the run ended before there was a model.
         """
         model = self.model
-        if not self.shaped[i]:
-            return None
-        q = quaternion_from_rotation(rotation_from_quaternion(self.quaternion[i]) @ model.basis.Phi)
-        t, log_s = self.t[i] / model.radius_px, np.log(self.s[i])
-        state = State(q[None], t[None], np.array([log_s]), self.Lambda[i][None] / model.unit)
-        return model.estimate(i, self.W[i], self.visible[i], state)
+        return self.estimates.of(i, model, self.W[i], self.visible[i]) if self.shaped[i] else None
 
     def shapes(self) -> Array:
         """All shapes (F, 3, P) in camera axes, pixels of the first frame; NaN in frames without one.

@@ -125,14 +125,14 @@ def draw_share(axes: Axes, reviewed: list[Reviewed]) -> None:
 
 def draw_coefficients(maps: list[Axes], shaped: list[Reviewed]) -> None:
     """Λ over time: for each recording a map per row Γ, its modes downwards; one scale for all."""
-    limit = max(float(np.nanmax(np.abs(playback.Lambda), initial=0.0)) for playback, *_ in shaped) or 1.0
+    limit = max(float(np.nanmax(np.abs(playback.estimates.Lambda), initial=0.0)) for playback, *_ in shaped) or 1.0
     # Bending is far larger than stretching: the scale is linear only near zero, so that both show.
     scale = AsinhNorm(limit / 50, -limit, limit)
     for n, (playback, _, label, _) in enumerate(shaped):
-        modes, name = playback.Lambda.shape[2], f" of {label}" if len(shaped) > 1 else ""
+        modes, name = playback.estimates.Lambda.shape[2], f" of {label}" if len(shaped) > 1 else ""
         edges = np.append(playback.frames - 0.5, playback.frames[-1] + 0.5)
         for k, row in enumerate(ROWS):
-            axes, values = maps[3 * n + k], playback.Lambda[:, k].T
+            axes, values = maps[3 * n + k], playback.estimates.Lambda[:, k].T
             image = axes.pcolormesh(edges, np.arange(modes + 1) + 0.5, values, cmap="RdBu_r", norm=scale, rasterized=True)
             axes.grid(visible=False)
             axes.set_ylim(modes + 0.5, 0.5)

@@ -19,11 +19,11 @@ def camera_path(playback: Playback, rows: Indices) -> tuple[Array, Array]:
     A rotation's columns are the camera's x (right), y (down) and z (forward). An orthographic camera has no
     position: NaN.
     """
-    R = rotation_from_quaternion(playback.quaternion[rows])
+    R = rotation_from_quaternion(playback.estimates.quaternion[rows])
     camera = playback.camera
     if not camera.perspective:
         return R.transpose(0, 2, 1), np.full((len(R), 3), np.nan)
-    s, t = playback.s[rows], playback.t[rows]
+    s, t = playback.estimates.s[rows], playback.estimates.t[rows]
     origin = np.column_stack([t, np.full(len(t), camera.focal_px)]) / s[:, None]
     return R.transpose(0, 2, 1), -np.einsum("fji,fj->fi", R, origin)
 
@@ -50,9 +50,9 @@ def write_npz(playback: Playback, file: BinaryIO, advance: Callable[[], None]) -
         file,
         S=shapes,
         R=camera_R.transpose(0, 2, 1),
-        s=playback.s[rows],
-        t=playback.t[rows],
-        Lambda=playback.Lambda[rows],
+        s=playback.estimates.s[rows],
+        t=playback.estimates.t[rows],
+        Lambda=playback.estimates.Lambda[rows],
         visible=playback.visible[rows],
         frames=playback.frames[rows],
         faces=playback.mesh.faces,
@@ -65,7 +65,7 @@ def write_npz(playback: Playback, file: BinaryIO, advance: Callable[[], None]) -
         W=playback.W[rows],
         projection=projections,
         times_s=playback.times_s[rows],
-        quaternion=playback.quaternion[rows],
+        quaternion=playback.estimates.quaternion[rows],
         camera_R=camera_R,
         camera_position=camera_position,
         texture_px=playback.texture_px,
@@ -83,7 +83,7 @@ def write_csv(playback: Playback, folder: Path, advance: Callable[[], None]) -> 
     shaped = np.flatnonzero(playback.shaped)
     _, positions = camera_path(playback, shaped)
     position = dict(zip(shaped.tolist(), positions, strict=True))
-    modes = playback.Lambda.shape[2]
+    modes = playback.estimates.Lambda.shape[2]
     names = [f"{row}_{k}" for row in ROW_NAMES for k in range(1, modes + 1)]
     times = [(int(frame), round(float(time), 6)) for frame, time in zip(playback.frames, playback.times_s, strict=True)]
 
@@ -91,9 +91,9 @@ def write_csv(playback: Playback, folder: Path, advance: Callable[[], None]) -> 
     camera_columns = ["camera_x", "camera_y", "camera_z", "camera_qw", "camera_qx", "camera_qy", "camera_qz"]
 
     def pose_row(i: int) -> list[object]:
-        q = playback.quaternion[i]
+        q = playback.estimates.quaternion[i]
         camera = position.get(i, np.full(3, np.nan))
-        values = [*q, *playback.t[i], playback.s[i], *camera, *(q * (1, -1, -1, -1))]
+        values = [*q, *playback.estimates.t[i], playback.estimates.s[i], *camera, *(q * (1, -1, -1, -1))]
         return [*times[i], playback.phases[i], *cells(values)]
 
     frames = range(len(times))
@@ -101,7 +101,7 @@ def write_csv(playback: Playback, folder: Path, advance: Callable[[], None]) -> 
     table(
         folder / "lambda.csv",
         ["frame", "time_s", *names],
-        ([*times[i], *cells(playback.Lambda[i].ravel())] for i in frames),
+        ([*times[i], *cells(playback.estimates.Lambda[i].ravel())] for i in frames),
     )
     table(folder / "mesh.csv", ["a", "b", "c"], playback.mesh.faces.tolist())
 

@@ -13,8 +13,8 @@ Static:
   of the vertices ignore it).
 - `world/camera`: Pinhole with intrinsics and resolution, Transform3D; for perspective cameras only.
 - `world/camera/image`: Transform3D by half a pixel: everywhere here pixel centres are at whole numbers.
-- `model`: modeshape.Model with rest S̄ (3p), Upsilon Υ (rp), eigenvalues (r), Phi Φ (9), faces (3m) and
-  edges (2n) int64, strips int64 (see `wireframe`; −1 ends a strip), texture_px (2p) the vertices in the
+- `model/<n>`: the n-th model, from 0: modeshape.Model with rest S̄ (3p), Upsilon Υ (rp), eigenvalues (r), Phi Φ (9),
+  faces (3m) and edges (2n) int64, strips int64 (see `wireframe`; −1 ends a strip), texture_px (2p) the vertices in the
   first frame, texture_origin (2) px of the crop in it, size (2) of the picture, perspective bool,
   focal_px, center_px (2).
 - `modes`: EncodedImage (JPEG), figure of the mode shapes; there when the run is complete.
@@ -38,7 +38,9 @@ Every frame with a shape:
 - `world/camera/wireframe`: LineStrips2D, the reprojected mesh in px: the vertices in the order of
   `strips`.
 - `world/camera/points/predicted`: Points2D, not seen; drawn where the model says they are.
-- `estimate`: modeshape.Estimate with quaternion (4) w first, t (2) px, s, Lambda (3r), visible (p) bool.
+- `estimate`: modeshape.Estimate with quaternion (4) w first, t (2) px, s, Lambda (3r), visible (p) bool, and model
+  int64, the n of the model that it is of.
+- `online`: the same as it was shown on the way, before a final pass; there if that was to be kept.
 - `quality/error`: Scalars, RMS and median reprojection error, px.
 - `coefficients/spectrum`: BarChart, Λ (3r): Γ_α, Γ_β, Γ_τ side by side.
 - `coefficients/leading`: Scalars, the first entries of Γ_α, Γ_β, Γ_τ.
@@ -59,6 +61,7 @@ PREDICTED = "world/camera/points/predicted"
 LOST = "world/camera/points/lost"
 OBSERVATION = "observation"
 ESTIMATE = "estimate"
+ONLINE = "online"
 MODEL = "model"
 ERROR = "quality/error"
 VISIBLE = "quality/visible"

@@ -3,15 +3,12 @@
 import os
 import pickle
 import subprocess
-import sys
-from multiprocessing import Pipe
-from multiprocessing.connection import Connection
 from queue import Queue
 from threading import Thread
 from types import TracebackType
 from typing import Any, Self, cast
 
-from app.recording.environment import environment
+from app.child import child, connection_to_parent
 from app.terminal.errors import UsageError
 
 MOST_WAITING = 64  # calls, some ten frames: then the run waits for the disk
@@ -35,9 +32,7 @@ class RecordingProcess:
         self._process: subprocess.Popen[bytes] | None = None
         if not needed:
             return
-        self._connection, theirs = Pipe()
-        with theirs:
-            self._process = started(theirs.fileno())
+        self._process, self._connection = child("app.recording.process")
         self._sender = Thread(target=self._send, name="record", daemon=True)
         self._sender.start()
 
@@ -111,18 +106,6 @@ class RecordingProcess:
             raise error
 
 
-def started(file: int) -> "subprocess.Popen[bytes]":
-    """The other process, which talks over an open file, by its number."""
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", "app.recording.process", str(file)],  # -P: not the user's modules
-        env=environment() | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-        stdin=subprocess.DEVNULL,
-        stdout=2,  # stderr: stdout is for the summary
-        pass_fds=[file],
-        start_new_session=True,  # Ctrl-C ends the run, which then tells what is left to write
-    )
-
-
 def main() -> None:
     """What the other process does: exceptions are sent back, and None once everything is written."""
     import cv2
@@ -130,8 +113,7 @@ def main() -> None:
     from app.recording.recording import Recording
 
     cv2.setNumThreads(1)
-    os.set_inheritable(int(sys.argv[1]), False)
-    connection = Connection(int(sys.argv[1]))
+    connection = connection_to_parent()
     recording: Recording | None = None
     failed = False
     method = ""

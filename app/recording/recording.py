@@ -47,6 +47,7 @@ class Recording:
         image: how frames are stored: each as JPEG, the video file as it is, or not at all.
         video: the source's file, for image="video".
         overwrite: replace an existing file.
+        keep_online: keep the estimates from before the final pass beside those of it.
 
     Raises:
         UsageError: the file exists or cannot be written, no viewer answers, the video cannot be stored.
@@ -63,8 +64,11 @@ class Recording:
         image: Literal["jpeg", "video", "none"] = "jpeg",
         video: Path | None = None,
         overwrite: bool = False,
+        keep_online: bool = False,
     ) -> None:
         self.path = path
+        self._estimates = (entities.ESTIMATE, entities.ONLINE) if keep_online else (entities.ESTIMATE,)
+        self._models = 0
         self._size, self._image = size, image
         self._video_ns: Indices = np.empty(0, np.int64)
         self._frames = 0
@@ -119,13 +123,13 @@ class Recording:
             self._stream.flush()
 
     def rest(self, basis: ModalBasis, mesh: Mesh, camera: Camera, texture_bgr: Image, texture_px: Array) -> None:
-        """The model, once it is known; `texture_px` (p, 2) are its vertices' pixels in `texture_bgr`."""
+        """A model, of the estimates that follow; `texture_px` (p, 2) are its vertices' pixels in `texture_bgr`."""
         if not self._stream.open:
             return
         self._strips = edge_strips(mesh.edges)
         crop, origin = cropped(texture_bgr, texture_px)
         self._stream.values(
-            entities.MODEL,
+            f"{entities.MODEL}/{self._models}",
             "Model",
             static=True,
             rest=basis.rest.ravel(),
@@ -144,7 +148,12 @@ class Recording:
         )
         self._stream.log(entities.MESH, texture(crop, texture_px - origin, mesh.faces), static=True)
         self._camera = camera
+        self._models += 1
         self._stream.static(coefficient_styles(len(basis.eigenvalues)))
+
+    def final_pass(self) -> None:
+        """The estimates that follow are of the final pass."""
+        self._estimates = (entities.ESTIMATE,)
 
     def estimate(self, index: int, time_s: float, estimate: ShapeEstimate) -> None:
         """One frame's shape and pose."""
@@ -155,15 +164,17 @@ class Recording:
         if not self._placed:
             self._stream.static(placement(vertices, self._camera, self._size))
             self._placed = True
-        self._stream.values(
-            entities.ESTIMATE,
-            "Estimate",
-            quaternion=estimate.quaternion,
-            t=estimate.t,
-            s=estimate.s,
-            Lambda=estimate.Lambda.ravel(),
-            visible=estimate.visible,
-        )
+        for entity in self._estimates:
+            self._stream.values(
+                entity,
+                "Estimate",
+                quaternion=estimate.quaternion,
+                t=estimate.t,
+                s=estimate.s,
+                Lambda=estimate.Lambda.ravel(),
+                visible=estimate.visible,
+                model=self._models - 1,
+            )
         self._stream.log(entities.MESH, rr.Mesh3D.from_fields(vertex_positions=vertices.astype(np.float32)))
         self._stream.log(entities.WIREFRAME, line_strips(projection, self._strips))
         self._points(entities.PREDICTED, projection[~estimate.visible])

@@ -9,10 +9,10 @@ from threading import Thread
 import rerun as rr
 import rerun_cli  # type: ignore[import-untyped]
 
+from app.environment import environment
 from app.files.writing import moved_when_complete
 from app.recording import entities
 from app.recording.blueprint import blueprint
-from app.recording.environment import environment
 from app.terminal.errors import UsageError
 
 FLUSH_SECONDS = 10.0  # a viewer that hangs must not stop a run

@@ -14,7 +14,7 @@ QUALITY = 85
 
 def strip(playback: Playback) -> bytes:
     """A JPEG of frames evenly spread over those that have a shape."""
-    shaped = np.flatnonzero(np.isfinite(playback.s))
+    shaped = np.flatnonzero(np.isfinite(playback.estimates.s))
     chosen = set(shaped[np.linspace(0, len(shaped) - 1, COLUMNS * ROWS).round().astype(int)].tolist())
     pictures = [smaller(image) for row, image in overlaid(playback) if row in chosen]
     while len(pictures) < COLUMNS * ROWS:

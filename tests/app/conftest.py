@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reconstruction.camera import Camera
-from tests.app import forked_recorder
+from tests.app import forked
 from tests.app.command_line import Command, in_process, still, turning, write_video
 from tests.app.exported import FRAMES as EXPORTED
 from tests.synthetic_run import Run, write_run
@@ -23,10 +23,10 @@ def here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def quick_to_record(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Recording processes are forked, except where they are what is tested."""
+def quick_to_start(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Our processes are forked, except where they are what is tested."""
     if "recording" not in str(request.path.relative_to(Path(__file__).parent)):
-        monkeypatch.setattr("app.recording.process.started", forked_recorder.started)
+        monkeypatch.setattr("app.child.started", forked.started)
 
 
 @pytest.fixture

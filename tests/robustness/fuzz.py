@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.recording.environment import environment as completed_environment
+from app.environment import environment as completed_environment
 
 ROOT = Path(__file__).parents[2]
 CASES, WORKERS = 300, 2

@@ -99,7 +99,7 @@ def test_csv(path: Path, tmp_path: Path) -> None:
     assert table["error_rms_px"] == pytest.approx([ERROR_PX] * FRAMES, abs=1e-4)
     assert table["visible"] == [48, 32] * (FRAMES // 2)
     assert table["reconstruct_ms"] == [7.0] * FRAMES
-    playback = Playback.load(path)
+    playback = Playback.load(path).estimates
     assert table["qy"] == pytest.approx(playback.quaternion[:, 2].tolist(), abs=1e-12)
     assert table["Lambda_tau_px"] == pytest.approx(np.linalg.norm(playback.Lambda[:, 2], axis=1).tolist(), rel=1e-12)
     with out.open(encoding="utf-8", newline="") as file:
@@ -152,7 +152,7 @@ def test_heat_map_shows_the_coefficients(path: Path) -> None:
     [tau] = [axes for axes in figure.axes if "tau" in axes.get_ylabel()]
     drawn = tau.collections[0].get_array()
     assert drawn is not None
-    assert np.array_equal(np.asarray(drawn).reshape(4, FRAMES), both[0].playback.Lambda[:, 2].T)
+    assert np.array_equal(np.asarray(drawn).reshape(4, FRAMES), both[0].playback.estimates.Lambda[:, 2].T)
 
 
 @pytest.mark.parametrize(("suffix", "start"), [(".pdf", b"%PDF"), (".svg", b"<?xml"), (".PNG", b"\x89PNG")])

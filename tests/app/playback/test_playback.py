@@ -100,8 +100,8 @@ def test_of_a_frame_that_is_estimated_again_the_last_counts(tmp_path: Path) -> N
         recording.event(1, 1 / 30, "first")
         recording.event(1, 1 / 30, "second", "WARN")
     playback = Playback.load(path)
-    assert playback.s[1:].tolist() == [0.5, 1.0]
-    assert np.array_equal(playback.Lambda[1], corrected.Lambda)
+    assert playback.estimates.s[1:].tolist() == [0.5, 1.0]
+    assert np.array_equal(playback.estimates.Lambda[1], corrected.Lambda)
     assert playback.shaped.tolist() == [False, True, True]
     assert playback.estimate(0) is None
     assert np.isnan(playback.shapes()[0]).all()

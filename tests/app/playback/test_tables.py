@@ -37,7 +37,7 @@ def test_npz_is_what_the_run_had(tmp_path: Path, which: str, request: pytest.Fix
 
 def test_npz_has_empty_rows_where_the_surface_was_lost(run: Run) -> None:
     playback = Playback.load(run.path)
-    s, quaternion, visible = playback.s.copy(), playback.quaternion.copy(), playback.visible.copy()
+    s, quaternion, visible = playback.estimates.s.copy(), playback.estimates.quaternion.copy(), playback.visible.copy()
     s[3], quaternion[3], visible[3] = np.nan, np.nan, False
     phases = [*playback.phases[:3], "lost", *playback.phases[4:]]
     file = BytesIO()

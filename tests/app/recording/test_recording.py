@@ -52,7 +52,7 @@ def test_observations_come_back(run: Run, rows: Rows) -> None:
 
 
 def test_reprojected_mesh_is_found_by_its_strips(run: Run, rows: Rows) -> None:
-    strips = np.array(rows[entities.MODEL, "modeshape.Model:strips"][None])
+    strips = np.array(rows[f"{entities.MODEL}/0", "modeshape.Model:strips"][None])
     for index, estimate in enumerate(run.estimates):
         drawn = np.concatenate(rows[entities.WIREFRAME, "LineStrips2D:strips"][index])
         np.testing.assert_allclose(drawn, estimate.projection_px[strips[strips >= 0]], rtol=1e-6)
@@ -72,7 +72,7 @@ def test_the_model_is_complete(run: Run, rows: Rows) -> None:
         ("focal_px", [200.0]),
         ("center_px", [80.0, 60.0]),
     ):
-        np.testing.assert_array_equal(rows[entities.MODEL, f"modeshape.Model:{name}"][None], value)
+        np.testing.assert_array_equal(rows[f"{entities.MODEL}/0", f"modeshape.Model:{name}"][None], value)
 
 
 def test_the_texture_is_the_first_frame(run: Run, rows: Rows) -> None:
@@ -130,5 +130,5 @@ def test_configuration_version_and_summary(rows: Rows) -> None:
 
 def test_an_orthographic_camera_has_no_pinhole(tmp_path: Path) -> None:
     rows = read(write_run(tmp_path / "flat.rrd", camera=Camera(np.inf, np.array([80.0, 60.0]))).path)
-    assert rows[entities.MODEL, "modeshape.Model:perspective"][None] == [False]
+    assert rows[f"{entities.MODEL}/0", "modeshape.Model:perspective"][None] == [False]
     assert not any(entity == entities.CAMERA for entity, _ in rows)

@@ -1,0 +1,70 @@
+"""The estimates of a recording: pose and Λ of every frame, by one model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from app.arrays import Array, Flags
+from app.playback.chunks import Rows
+from reconstruction.basis.model import Model
+from reconstruction.camera import quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.estimate import ShapeEstimate
+from reconstruction.state import State
+
+ESTIMATE = "modeshape.Estimate:"
+FAR = 100.0  # times the size, at which an orthographic camera may as well stand
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """Poses and Λ of F frames; NaN in those without a shape.
+
+    Attributes:
+        quaternion: (F, 4) w first.
+        t: (F, 2) px.
+        s: (F,).
+        Lambda: (F, 3, r) px.
+    """
+
+    quaternion: Array
+    t: Array
+    s: Array
+    Lambda: Array
+
+    def of(self, i: int, model: Model, W: Array, visible: Flags) -> ShapeEstimate:
+        """Shape and pose of row i, by the model they are of; W (2, P) px, visible (P,)."""
+        q = quaternion_from_rotation(rotation_from_quaternion(self.quaternion[i]) @ model.basis.Phi)
+        t, log_s = self.t[i] / model.radius_px, np.log(self.s[i])
+        return model.estimate(i, W, visible, State(q[None], t[None], np.array([log_s]), self.Lambda[i][None] / model.unit))
+
+
+def read_estimates(rows: Rows, entity: str, frames: Sequence[int], models: Sequence[Model]) -> Estimates:
+    """The estimates of frames by the last model; what was shown by an earlier one is as near as this comes to it."""
+    modes = [len(model.basis.eigenvalues) for model in models] or [0]
+    found = Estimates(*(np.full((len(frames), *size), np.nan) for size in ((4,), (2,), (), (3, modes[-1]))))
+    values = {name: rows.last(entity, f"{ESTIMATE}{name}") for name in ("quaternion", "t", "s", "Lambda", "model")}
+    if not models:
+        return found
+    for i, frame in enumerate(frames):
+        if not all(frame in rows_of_name for rows_of_name in values.values()):
+            continue
+        q, t, s, Lambda, number = (np.asarray(cast(Array, one[frame].value)) for one in values.values())
+        model = models[int(number[0])]
+        if model is not models[-1]:
+            single = Estimates(q[None], t[None], s, Lambda.reshape(1, 3, -1))
+            nothing = np.zeros(model.basis.rest.shape[1], np.bool_)
+            seen = translated(models[-1], model, single.of(0, model, np.zeros((2, len(nothing))), nothing))
+            q, t, s, Lambda = seen.quaternion, seen.t, np.array([seen.s]), seen.Lambda
+        found.quaternion[i], found.t[i], found.s[i], found.Lambda[i] = q, t, s[0], Lambda.reshape(3, -1)
+    return found
+
+
+def translated(model: Model, before: Model, seen: ShapeEstimate) -> ShapeEstimate:
+    """The estimate that comes nearest to one of a model before, of the same points, at the same place in the image."""
+    focal_px = model.camera.focal_px if model.camera.perspective else FAR * model.radius
+    origin = np.array([*seen.t, focal_px]) / seen.s
+    shape = seen.R @ before.basis.deform(seen.Lambda) + origin[:, None]
+    state = model.state_of(shape, focal_px, np.ones(shape.shape[1], np.bool_), None)
+    return model.estimate(seen.frame, seen.projection_px.T, seen.visible, state)
