@@ -20,7 +20,7 @@ from reconstruction.window.energy import build_energy, build_guides
 from reconstruction.window.priors import Weights
 from reconstruction.window.window import SlidingWindow
 
-CATCH_UP = 4  # most frames whose shapes are found with one observation, while others wait
+CATCH_UP = 4  # most frames of a live source whose shapes are found with one observation, while others wait
 
 
 class Phase(Enum):
@@ -142,7 +142,7 @@ class Reconstruction:
         if found is not None:
             self.revisions += self.window is not None
             self._adopt(found)
-        return self._advance(CATCH_UP)
+        return self._advance(CATCH_UP if self._mapper and self._mapper.live else len(self._waiting))
 
     def restart(self) -> None:
         """The surface was lost and is seen again, somewhere else: keep the model, forget the last frames."""

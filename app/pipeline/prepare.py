@@ -38,7 +38,7 @@ def prepared(config: Run, first: Frame, start: Start) -> tuple[Array, Reconstruc
     camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
     settings = settings_of(model, config.rest_shape, estimate_focal=not isinstance(model.focal, float))
     if config.rest_shape in RECOVERED:
-        mapper = Mapper(settings, start, wait=not config.live)
+        mapper = Mapper(settings, start, live=config.live)
         return points_px, Reconstruction(camera, settings, mapper=mapper)
     given, inside = rest_of_surface(Path(config.rest_shape), points_px, camera)
     return points_px[inside], Reconstruction(camera, settings, given)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,8 @@ from reconstruction.mapping.keyframes import Keyframes, difference
 from reconstruction.mapping.map import Map, map_of
 from reconstruction.settings import Settings
 
-FIRST_LOOKS = (30, 60)  # frames after which a first model is looked for; the last decides
-FIRST_LATENCY, LATENCY = 30, 90  # frames after which a first model and another one are in force, if they are waited for
+FIRST_LOOKS = (10, 15, 20, 30, 45, 60)  # frames after which a first model is looked for; the last decides
+LATENCY = 90  # frames after which a map that another process makes is in force: three seconds of most videos
 FEWEST = 10  # keyframes for a map
 GROWN = 1.3  # times as far apart as at the last map the keyframes are before there is another,
 RENEWED = 4 / 3  # or so many times as many frames have been keyframes
@@ -34,26 +34,38 @@ def at_once(function: Callable[..., Any], *arguments: object) -> "Future[Any]":
     return future
 
 
+@dataclass(frozen=True)
+class Job:
+    """A model that has been begun, and the frame from which on it is in force, if that is waited for."""
+
+    future: "Future[Map | None]"
+    due: int
+
+
 class Mapper:
     """What is known of the object so far, and when to look again.
 
     Args:
         settings: how to reconstruct.
         start: where models are made.
-        wait: whether a model is in force a fixed number of frames after it was begun, waiting for it if need be, so that
-            shapes depend on no machine's speed; else as soon as it is there.
+        live: whether frames do not wait for models: each is in force as soon as it is there. Else the first is when it is
+            begun, and others a fixed number of frames later, so that shapes depend on no machine's speed.
 
     Attributes:
+        live: the same.
         first_frames: so many gave the first model.
     """
 
-    def __init__(self, settings: Settings, start: Start = at_once, *, wait: bool = False) -> None:
-        self._settings, self._start, self._wait = settings, start, wait
+    def __init__(self, settings: Settings, start: Start = at_once, *, live: bool = False) -> None:
+        self._settings, self._start, self.live = settings, start, live
+        self._latency = 0 if start is at_once else LATENCY
         self._keyframes = Keyframes() if settings.maps else None
-        self._frame, self._due = -1, 0
-        self._job: Future[Map | None] | None = None
+        self._frame = -1
         self._first: list[tuple[Array, Mask]] | None = []  # frames, until they have given the first model
         self.first_frames = 0
+        self._looks = FIRST_LOOKS if settings.bootstrap_frames == "auto" else (settings.bootstrap_frames,)
+        self._first_job: Job | None = None
+        self._map_job: Job | None = None
         self._seen: tuple[Array, Mask, Indices] | None = None  # the keyframes of the last map,
         self._found: Map | None = None  # and what they showed
         self._version, self._extent = 0, 0.0  # of the keyframes when they were last looked at
@@ -75,11 +87,11 @@ class Mapper:
             self._keyframes.offer(self._frame, W, visible)
         if self._first is not None:
             self._first.append((W, visible))
-        found = self._result()
-        if found is None and self._job is None:
-            self._look(camera)
-            found = self._result()
-        return found if found is None or self._seen is None else nearest_first(found, *self._seen[:2], *begin)
+            self._look_first(self._first, camera)
+        self._look_again(camera)
+        if self._first is not None:
+            return self._first_model()
+        return self._another(begin)
 
     def finish(self, camera: Camera) -> Map | None:
         """The model of fewer first frames than are wanted, since no more come; None if there was one, or no frame.
@@ -91,51 +103,62 @@ class Mapper:
             return None
         self.first_frames = max(self.first_frames, len(self._first))
         W, visible = stacked(self._first)
-        found = self._job.result() if self._job is not None else None
+        begun = self._first_job.future.result() if self._first_job else None
         self._first = None
-        return found or bootstrap(W, visible, camera, self._settings, last=True)
+        return begun or bootstrap(W, visible, camera, self._settings, last=True)
 
     def final(self, camera: Camera) -> Map | None:
         """The map of the keyframes of all frames, posed in the first of them first; None if they do not tell."""
         if self._keyframes is None:
             return None
-        if self._seen is None or self._job is not None or self._version != self._keyframes.version:
+        if self._seen is None or self._map_job or self._version != self._keyframes.version:
             self._seen = self._keyframes.spread()
             self._found = map_of(*self._seen[:2], camera, self._settings.estimate_focal) or self._found
         return self._found and in_order(self._found, np.argsort(self._seen[2]))
 
-    def _look(self, camera: Camera) -> None:
-        """Begin another model, if it is time."""
-        if self._first is not None:
-            wanted = self._settings.bootstrap_frames
-            looks = FIRST_LOOKS if wanted == "auto" else (wanted,)
-            n = len(self._first)
-            if n in looks or n > looks[-1]:
-                self._job = self._start(bootstrap, *stacked(self._first), camera, self._settings, n >= looks[-1])
-                self.first_frames, self._due = n, self._frame + FIRST_LATENCY
-        elif self._keyframes is not None and self._grown(self._keyframes):
-            self._seen = self._keyframes.spread()
-            self._version, self._extent = self._keyframes.version, self._keyframes.extent
-            self._job = self._start(map_of, *self._seen[:2], camera, self._settings.estimate_focal)
-            self._due = self._frame + LATENCY
+    def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
+        """Begin a first model, if it is time."""
+        n = len(first)
+        if self._first_job is None and (n in self._looks or n > self._looks[-1]):
+            arguments = *stacked(first), camera, self._settings, n >= self._looks[-1]
+            self._first_job = Job(self._start(bootstrap, *arguments), self._frame)
+            self.first_frames = n
 
-    def _grown(self, keyframes: Keyframes) -> bool:
-        """Whether the keyframes have more to tell than when they were last looked at."""
-        if len(keyframes.frames) < FEWEST:
-            return False
-        return keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version
-
-    def _result(self) -> Map | None:
-        """What has been begun, once it is in force."""
-        if self._job is None or not (self._frame >= self._due if self._wait else self._job.done()):
+    def _first_model(self) -> Map | None:
+        """The first model, once it is in force."""
+        if not self._ready(self._first_job):
             return None
-        job, self._job = self._job, None
-        found = job.result()
-        if found is not None and self._first is not None:
+        assert self._first_job is not None
+        found, self._first_job = self._first_job.future.result(), None
+        if found is not None:
             self._first = None
-        elif found is not None:
-            self._found = found
         return found
+
+    def _look_again(self, camera: Camera) -> None:
+        """Begin a map, if the keyframes have more to tell than when they were last looked at."""
+        keyframes = self._keyframes
+        if keyframes is None or self._map_job or self._frame + 1 < self._looks[-1] or len(keyframes.frames) < FEWEST:
+            return
+        if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
+            self._seen, self._version, self._extent = keyframes.spread(), keyframes.version, keyframes.extent
+            arguments = *self._seen[:2], camera, self._settings.estimate_focal
+            self._map_job = Job(self._start(map_of, *arguments), self._frame + self._latency)
+
+    def _another(self, begin: tuple[Array, Mask]) -> Map | None:
+        """The map, once it is in force, posed first as in the frame where it begins."""
+        if not self._ready(self._map_job):
+            return None
+        assert self._map_job is not None
+        assert self._seen is not None
+        found, self._map_job = self._map_job.future.result(), None
+        if found is None:
+            return None
+        self._found = found
+        return nearest_first(found, *self._seen[:2], *begin)
+
+    def _ready(self, job: Job | None) -> bool:
+        """Whether a job's result is in force."""
+        return job is not None and (job.future.done() if self.live else self._frame >= job.due)
 
 
 def stacked(frames: list[tuple[Array, Mask]]) -> tuple[Array, Mask]:

@@ -17,6 +17,7 @@ from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from reconstruction import ReconstructionError
 from reconstruction.estimate import ShapeEstimate, Switch
+from reconstruction.state import State
 from reconstruction.window.window import SlidingWindow
 from tests.synthetic_run import verify
 
@@ -127,8 +128,8 @@ def test_a_switch_of_branches_is_told_and_counted(
 ) -> None:
     advance = SlidingWindow.advance
 
-    def switching(self: SlidingWindow, W: np.ndarray, visible: np.ndarray) -> ShapeEstimate:
-        estimate = advance(self, W, visible)
+    def switching(self: SlidingWindow, W: np.ndarray, visible: np.ndarray, expected: State | None) -> ShapeEstimate:
+        estimate = advance(self, W, visible, expected)
         return replace(estimate, switch=Switch(-0.5, 0.0, 0.62)) if estimate.frame == 4 else estimate
 
     monkeypatch.setattr(SlidingWindow, "advance", switching)

@@ -18,6 +18,7 @@ from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import AFTER_CUT_S, Successor, options_for_another
 from app.playback.playback import Playback
 from app.terminal.progress import Progress
+from reconstruction.mapping.mapper import at_once
 from tests.app.command_line import Command, grain, in_own_process, turning, write_video
 from tests.synthetic_run import verify
 from tests.tracking.scene import SIZE, texture
@@ -201,7 +202,7 @@ def test_a_batch_keeps_the_parts(modeshape: Command, two_scenes: Path, here: Pat
 def test_what_is_covered_has_longer_than_what_was_cut(cut: bool, wait_s: float) -> None:
     config = Run("video.mp4", points=100, rest_shape="plane", model=Model(modes=5, bootstrap_frames=5))
     pictures = list(another(60))
-    successor = Successor(config, Frame(0, 100.0, pictures[0]), Stopwatch(), cut=cut)
+    successor = Successor(config, Frame(0, 100.0, pictures[0]), Stopwatch(), at_once, cut=cut)
     for index, picture in enumerate(pictures):
         successor.look(Frame(index, 100.0 + wait_s - 1.0 + index / 30, picture))
         if successor.found:

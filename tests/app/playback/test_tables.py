@@ -41,7 +41,8 @@ def test_npz_has_empty_rows_where_the_surface_was_lost(run: Run) -> None:
     s[3], quaternion[3], visible[3] = np.nan, np.nan, False
     phases = [*playback.phases[:3], "lost", *playback.phases[4:]]
     file = BytesIO()
-    write_npz(replace(playback, s=s, quaternion=quaternion, visible=visible, phases=phases), file, lambda: None)
+    estimates = replace(playback.estimates, s=s, quaternion=quaternion)
+    write_npz(replace(playback, estimates=estimates, visible=visible, phases=phases), file, lambda: None)
     with np.load(BytesIO(file.getvalue())) as stored:
         assert stored["frames"].tolist() == list(range(FRAMES))
         for key in ("S", "R", "s", "projection", "camera_R", "camera_position"):
