@@ -81,9 +81,7 @@ class Session:
             source = iter(video)
             first, second = next(source), next(source, None)
             if second is None:
-                raise UsageError(
-                    f"{config.source} gives only one frame: a shape shows in how it moves; give a video, or more --frames"
-                )
+                raise UsageError(f"{config.source} gives only one frame: give a video, or more --frames")
             self.fps = video.fps
             self._object = self._first_object = TrackedObject(config, first, self._watch, self._maps.begin)
             self._path = output.out or (free_name(RECORDINGS, config.source) if self._record_unnamed else None)

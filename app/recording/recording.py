@@ -3,16 +3,13 @@
 What is written where is listed in `app.recording.entities`.
 """
 
-import json
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from types import TracebackType
 from typing import Literal, Self
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
 from app.arrays import Array, Image, Indices
 from app.files.writing import check_free
@@ -88,7 +85,7 @@ class Recording:
         self._stream = Stream(path, urls)
         if path is not None:
             self._stream.name(path.stem)
-        self._document(entities.CONFIGURATION, "Configuration", configuration)
+        self._stream.document(entities.CONFIGURATION, "Configuration", configuration)
         self._stream.static(styles())
         if image == "video":
             self._stream.log(entities.IMAGE, asset, static=True)
@@ -108,12 +105,12 @@ class Recording:
         if len(self._last_seen) != len(points):
             self._last_seen = np.full_like(points, np.nan)
         self._last_seen[visible] = points[visible]
-        self._points(entities.SEEN, points[visible])
+        self._stream.points(entities.SEEN, points[visible])
         without_shape = not self._strips or phase.lower() == "lost"
         lost = self._last_seen[~visible & np.isfinite(self._last_seen[:, 0])] if without_shape else NOWHERE
-        self._points(entities.LOST, lost)
+        self._stream.points(entities.LOST, lost)
         if self._strips and without_shape:  # the model's last word would stay on the picture
-            self._points(entities.PREDICTED, NOWHERE)
+            self._stream.points(entities.PREDICTED, NOWHERE)
             self._stream.log(entities.WIREFRAME, rr.LineStrips2D([]))
         self._stream.values(entities.OBSERVATION, "Observation", visible=visible, phase=phase)
         if visible.size:
@@ -177,8 +174,8 @@ class Recording:
             )
         self._stream.log(entities.MESH, rr.Mesh3D.from_fields(vertex_positions=vertices.astype(np.float32)))
         self._stream.log(entities.WIREFRAME, line_strips(projection, self._strips))
-        self._points(entities.PREDICTED, projection[~estimate.visible])
-        self._points(entities.LOST, NOWHERE)
+        self._stream.points(entities.PREDICTED, projection[~estimate.visible])
+        self._stream.points(entities.LOST, NOWHERE)
         residuals = estimate.residual_px[np.isfinite(estimate.residual_px)]
         if residuals.size:
             rms_and_median = [np.sqrt(np.mean(residuals**2)), np.median(residuals)]
@@ -213,7 +210,7 @@ class Recording:
 
     def summary(self, values: Mapping[str, object]) -> None:
         """What came out of the run."""
-        self._document(entities.SUMMARY, "Summary", values)
+        self._stream.document(entities.SUMMARY, "Summary", values)
 
     def close(self) -> None:
         """Complete the file; one without a frame is removed, so as not to be in the way of the next run.
@@ -246,14 +243,3 @@ class Recording:
         finally:
             if failed and not self._placed and self.path is not None:
                 self.path.unlink(missing_ok=True)
-
-    def _points(self, entity: str, points_px: NDArray[np.floating]) -> None:
-        self._stream.log(entity, rr.Points2D.from_fields(positions=points_px.astype(np.float32)))
-
-    def _document(self, entity: str, title: str, values: Mapping[str, object]) -> None:
-        release = version("modeshape")
-        rows = [f"| {name} | {value} |" for name, value in values.items()]
-        text = "\n".join([f"# {title}", f"modeshape {release}", "", "| | |", "|---|---|", *rows])
-        self._stream.log(entity, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
-        serial = json.dumps(dict(values), default=str)
-        self._stream.values(entity, "Document", static=True, json=serial, version=release)

@@ -1,14 +1,18 @@
 """The channel a recording is written through: Rerun's stream to a file, to viewers, to both or to nothing."""
 
+import json
 import shutil
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from importlib.metadata import version
 from pathlib import Path
 from threading import Thread
 
+import numpy as np
 import rerun as rr
 import rerun_cli  # type: ignore[import-untyped]
 
+from app.arrays import Array
 from app.environment import environment
 from app.files.writing import moved_when_complete
 from app.recording import entities
@@ -78,6 +82,18 @@ class Stream:
         """Write components of our own, at full precision; viewers do not draw them, programs read them."""
         named = rr.DynamicArchetype(f"{entities.APPLICATION}.{archetype}", components=components)
         self.log(entity, named, static=static)
+
+    def points(self, entity: str, points_px: Array) -> None:
+        """Write points (n, 2) of the picture."""
+        self.log(entity, rr.Points2D.from_fields(positions=points_px.astype(np.float32)))
+
+    def document(self, entity: str, title: str, values: Mapping[str, object]) -> None:
+        """Write values by name, as a table for people and as JSON for programs."""
+        release = version("modeshape")
+        rows = [f"| {name} | {value} |" for name, value in values.items()]
+        text = "\n".join([f"# {title}", f"modeshape {release}", "", "| | |", "|---|---|", *rows])
+        self.log(entity, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
+        self.values(entity, "Document", static=True, json=json.dumps(dict(values), default=str), version=release)
 
     def flush(self) -> None:
         """Wait until everything is on its way to the disk; a viewer that was closed meanwhile is no failure.

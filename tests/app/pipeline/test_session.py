@@ -128,7 +128,7 @@ def test_a_switch_of_branches_is_told_and_counted(
 ) -> None:
     advance = SlidingWindow.advance
 
-    def switching(self: SlidingWindow, W: np.ndarray, visible: np.ndarray, expected: State | None) -> ShapeEstimate:
+    def switching(self: SlidingWindow, W: np.ndarray, visible: np.ndarray, expected: State | None = None) -> ShapeEstimate:
         estimate = advance(self, W, visible, expected)
         return replace(estimate, switch=Switch(-0.5, 0.0, 0.62)) if estimate.frame == 4 else estimate
 
