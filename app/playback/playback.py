@@ -97,6 +97,8 @@ class Playback:
         if observed is None:
             raise UsageError(f"{file.path} contains no frame: the run ended before its first, or its start was lost")
         models = read_models(rows)
+        used = [int(cast(Array, row.value)[0]) for row in rows.last(entity, f"{ESTIMATE}model").values()]
+        models = models[: max(used, default=len(models)) + 1]
         recorded_model = with_texture(rows, models)
         numbers = observed.frames.tolist()
 

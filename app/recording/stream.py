@@ -11,8 +11,8 @@ from threading import Thread
 import numpy as np
 import rerun as rr
 import rerun_cli  # type: ignore[import-untyped]
+from numpy.typing import NDArray
 
-from app.arrays import Array
 from app.environment import environment
 from app.files.writing import moved_when_complete
 from app.recording import entities
@@ -83,7 +83,7 @@ class Stream:
         named = rr.DynamicArchetype(f"{entities.APPLICATION}.{archetype}", components=components)
         self.log(entity, named, static=static)
 
-    def points(self, entity: str, points_px: Array) -> None:
+    def points(self, entity: str, points_px: NDArray[np.floating]) -> None:
         """Write points (n, 2) of the picture."""
         self.log(entity, rr.Points2D.from_fields(positions=points_px.astype(np.float32)))
 

@@ -16,8 +16,10 @@ from app.playback.playback import Playback
 from app.recording.recording import FLUSH_FRAMES, Recording
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
-from reconstruction.camera import Camera
+from reconstruction.basis.modes import modal_basis
+from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
 from tests.synthetic_run import MODES, SIZE, STAGE_MS, write_run
+from tests.synthetic_run import Run as Made
 from tracking.klt import Observation
 from tracking.video import Frame, Video
 
@@ -186,3 +188,47 @@ def test_real_run(tmp_path: Path, shared_data: Path, image: str) -> None:
         for (_, picture), frame in zip(playback.images(), video, strict=True):
             assert picture is not None
             assert cv2.PSNR(picture, frame.image) > 30
+
+
+def test_shapes_of_an_earlier_model_are_as_near_as_the_last_one_comes(tmp_path: Path, run: Made) -> None:
+    """A model may be replaced on the way: more modes, another pose of the rest shape."""
+    first = run.estimates[-1]
+    R = rotation_from_quaternion(np.array([np.cos(0.2), 0.0, np.sin(0.2), 0.0]))
+    rest = R @ run.basis.rest
+    other = modal_basis(rest, run.mesh, 2 * MODES)
+    picture, seen = np.zeros((*SIZE[::-1], 3), np.uint8), Observation(run.pixels, np.ones(len(run.pixels), bool))
+    with Recording(tmp_path / "two.rrd", configuration={}, size=SIZE) as recording:
+        for frame, basis in enumerate((run.basis, other)):
+            recording.observe(Frame(frame, frame / 30, picture), seen, phase="tracking")
+            recording.rest(basis, run.mesh, run.camera, picture, run.pixels)
+            own = first if frame == 0 else replace(first, R=first.R @ R.T, Lambda=np.zeros((3, 2 * MODES)))
+            quaternion = quaternion_from_rotation(own.R)
+            recording.estimate(frame, frame / 30, replace(own, quaternion=quaternion))
+    playback = Playback.load(tmp_path / "two.rrd")
+    assert playback.basis.rest == pytest.approx(rest)
+    earlier = playback.estimate(0)
+    assert earlier is not None
+    assert earlier.Lambda.shape == (3, 2 * MODES)
+    assert np.abs(earlier.projection_px - first.projection_px).max() < 0.5
+    centred = [S - S.mean(axis=1, keepdims=True) for S in (earlier.shape, first.shape)]
+    assert np.linalg.norm(centred[0] - centred[1]) < 0.02 * np.linalg.norm(centred[1])
+
+
+def test_what_was_shown_on_the_way_is_kept_if_wanted(tmp_path: Path, run: Made) -> None:
+    picture, seen = np.zeros((*SIZE[::-1], 3), np.uint8), Observation(run.pixels, np.ones(len(run.pixels), bool))
+    before, after = run.estimates[-2:]
+    for keep in (True, False):
+        path = tmp_path / f"{keep}.rrd"
+        with Recording(path, configuration={}, size=SIZE, keep_online=keep) as recording:
+            recording.observe(Frame(0, 0.0, picture), seen, phase="tracking")
+            recording.rest(run.basis, run.mesh, run.camera, picture, run.pixels)
+            recording.estimate(0, 0.0, before)
+            recording.final_pass()
+            recording.rest(run.basis, run.mesh, run.camera, picture, run.pixels)
+            recording.estimate(0, 0.0, after)
+        assert np.array_equal(Playback.load(path).estimates.Lambda[0], after.Lambda)
+        if keep:
+            assert Playback.load(path, online=True).estimates.Lambda[0] == pytest.approx(before.Lambda)
+        else:
+            with pytest.raises(UsageError, match="--keep-online"):
+                Playback.load(path, online=True)

@@ -1,0 +1,133 @@
+"""When models are made, and from which frame on they are in force."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+
+import numpy as np
+import pytest
+
+from reconstruction.basis.rest_shape import RestShape, RigidMotion
+from reconstruction.camera import Camera
+from reconstruction.mapping import mapper
+from reconstruction.mapping.map import Map
+from reconstruction.mapping.mapper import FEWEST, FIRST_LOOKS, LATENCY, RENEWED, Mapper, at_once
+from reconstruction.settings import Settings
+
+POINTS = 20
+CAMERA = Camera(500.0, np.zeros(2))
+SHAPE = np.random.default_rng(0).normal(size=(3, POINTS))
+
+
+def model(poses: int) -> Map:
+    motion = RigidMotion(SHAPE, np.stack([np.eye(3)] * poses), np.arange(1.0, poses + 1), np.zeros((poses, 2)))
+    return Map(RestShape("rigid", motion, ""), CAMERA)
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Models that say how many frames they are of."""
+    monkeypatch.setattr(mapper, "bootstrap", lambda W, *others: model(len(W)) if others[-1] else None)
+    monkeypatch.setattr(mapper, "map_of", lambda W, *_: model(len(W)))
+
+
+class Later:
+    """Calls that are answered when they are told to be."""
+
+    def __init__(self) -> None:
+        self.begun: list[tuple[Future[object], Callable[..., object], tuple[object, ...]]] = []
+
+    def __call__(self, function: Callable[..., object], *arguments: object) -> "Future[object]":
+        self.begun.append((Future(), function, arguments))
+        return self.begun[-1][0]
+
+    def answer(self) -> None:
+        future, function, arguments = self.begun.pop(0)
+        future.set_result(function(*arguments))
+
+
+def image(frame: int) -> np.ndarray:
+    """Wider and wider."""
+    return SHAPE[:2] * [[1 + 0.01 * frame], [1.0]]
+
+
+def adopted(used: Mapper, frames: range) -> list[int]:
+    """The frames from which on another model is in force."""
+    seen = np.ones(POINTS, bool)
+    return [f for f in frames if used.add(image(f), seen, CAMERA, (image(f), seen)) is not None]
+
+
+def test_the_last_of_the_first_looks_decides() -> None:
+    used = Mapper(Settings(revise=False))
+    assert adopted(used, range(200)) == [FIRST_LOOKS[-1] - 1]
+    assert used.first_frames == FIRST_LOOKS[-1]
+    assert used.final(CAMERA) is None
+
+
+def test_maps_made_elsewhere_are_in_force_after_a_fixed_number_of_frames() -> None:
+    later = Later()
+
+    def soon(function: Callable[..., object], *arguments: object) -> "Future[object]":
+        future = later(function, *arguments)
+        later.answer()
+        return future
+
+    first = FIRST_LOOKS[-1] - 1
+    assert adopted(Mapper(Settings(), soon), range(first + LATENCY + 2))[:2] == [first, first + LATENCY]
+
+
+def test_live_ones_are_in_force_as_soon_as_they_are_there() -> None:
+    later = Later()
+    used = Mapper(Settings(revise=False), later, live=True)
+    assert adopted(used, range(80)) == []
+    assert len(later.begun) == 1
+    later.answer()  # with nothing: there were too few frames
+    assert adopted(used, range(80, 90)) == []
+    later.answer()
+    assert adopted(used, range(90, 100)) == [90]
+    assert used.first_frames == 82
+
+
+def test_another_look_when_the_views_have_grown() -> None:
+    versions: list[int] = []
+    used = Mapper(Settings())
+    seen = np.ones(POINTS, bool)
+    for f in range(300):
+        before = used._version
+        used.add(image(f), seen, CAMERA, (image(f), seen))
+        if used._version != before:
+            versions.append(used._version)
+    assert versions[0] >= FEWEST
+    assert 3 < len(versions) < 20
+    still = Mapper(Settings())
+    looks = [still.add(image(0), seen, CAMERA, (image(0), seen)) is not None for _ in range(300)]
+    assert sum(looks) <= 2  # nothing new comes
+
+
+def test_posed_first_as_where_it_begins() -> None:
+    used, seen = Mapper(Settings()), np.ones(POINTS, bool)
+    found = None
+    for f in range(61):
+        found = used.add(image(f), seen, CAMERA, (image(3), seen)) or found
+    assert found is not None
+    assert used._seen is not None
+    first = int(used._seen[2][int(found.rest.motion.s[0]) - 1])  # the scale says which keyframe a pose is of
+    assert abs(first - 3) <= 2
+
+
+def test_the_final_map_is_of_all_keyframes_and_made_once() -> None:
+    used = Mapper(Settings())
+    adopted(used, range(61))
+    found = used.final(CAMERA)
+    assert found is not None
+    assert used.final(CAMERA) is not None
+    assert used._seen is not None
+    assert found.rest.motion.s[0] - 1 == np.argsort(used._seen[2])[0]
+
+
+def test_what_goes_wrong_is_raised_with_the_result() -> None:
+    def fails() -> None:
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"):
+        at_once(fails).result()
+    assert RENEWED > 1
