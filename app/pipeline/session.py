@@ -11,14 +11,13 @@ from threadpoolctl import threadpool_limits
 from app.files.names import RECORDINGS, beside, free_name
 from app.files.writing import check_free
 from app.options.run import Run
-from app.pipeline.counts import Counts
 from app.pipeline.final_pass import final_pass
 from app.pipeline.map_process import MapProcess
 from app.pipeline.prefetch import Prefetch
 from app.pipeline.processed import InOrder, Processed, Surface
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import Successor, options_for_another
-from app.pipeline.summary import RunSummary, summary_of
+from app.pipeline.summary import Counts, RunSummary, summary_of
 from app.pipeline.tracked_object import FrameShape, TrackedObject
 from app.recording.process import RecordingProcess
 from app.terminal.errors import UsageError, in_a_line

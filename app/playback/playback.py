@@ -14,10 +14,9 @@ import numpy as np
 from app.arrays import Array, Flags, Image, Indices
 from app.playback.chunks import RecordingFile
 from app.playback.documents import DOCUMENT, NAME, SCALARS, document, events, recording_name, stages
-from app.playback.estimates import ESTIMATE, Estimates, read_estimates
+from app.playback.frames import ESTIMATE, OBSERVATION, POSITIONS, Estimates, read_estimates, read_observations
 from app.playback.images import stored_images
 from app.playback.model import MODEL, TEXTURE, RecordedModel, read_models, with_texture
-from app.playback.observations import OBSERVATION, POSITIONS, read_observations
 from app.recording import entities
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
