@@ -12,6 +12,9 @@ from app.child import child, connection_to_parent
 from app.terminal.errors import UsageError
 
 
+NICE = 5  # frames go first
+
+
 class MapProcess:
     """Calls functions in another process, one after the other; a context manager that ends it, whatever it does.
 
@@ -59,6 +62,7 @@ class MapProcess:
 def main() -> None:
     """What the other process does, until nobody listens any more."""
     connection: Connection = connection_to_parent()
+    os.nice(NICE)
     import reconstruction.mapping.mapper  # noqa: F401 (takes its time: before the first call)
 
     try:
