@@ -46,6 +46,8 @@ class ShapeEstimate:
         residual_px: (p,) distance to the observation, NaN where not visible.
         visible: (p,) h^f.
         switch: the change of branch in this frame, if there was one.
+        sigma: (p,) standard deviation of each vertex's distance from its true place, in the units of the shape, shift and
+            turn of the whole apart (`window.uncertainty`); None unless asked for.
     """
 
     frame: int
@@ -59,3 +61,4 @@ class ShapeEstimate:
     residual_px: Array
     visible: Mask
     switch: Switch | None = None
+    sigma: Array | None = None

@@ -212,6 +212,14 @@ class Reconstruction:
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
         refine = self.settings.refine_rest and not paper and rest.kind != "isometric"
         guides = build_guides(model, self.deformation, paper=paper)
-        self.window = SlidingWindow(model, energy, self.settings.window, rest.motion, refine=refine, guides=guides)
+        self.window = SlidingWindow(
+            model,
+            energy,
+            self.settings.window,
+            rest.motion,
+            refine=refine,
+            guides=guides,
+            uncertainty=self.settings.uncertainty,
+        )
         if before is not None and last is not None:
             self.window.frames, self.window.state = before.frames, found.state_of(model, last.shape)

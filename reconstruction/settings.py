@@ -43,6 +43,8 @@ class Settings:
     inextensibility."""
     refine_rest: bool = True
     """Let later frames improve the rest shape. Not with the paper's energy."""
+    uncertainty: bool = False
+    """Estimate a standard deviation for each vertex of each frame, too."""
     estimate_focal: bool = False
     """Find the focal length of a perspective camera, where the frames hold it."""
     revise: bool = True

@@ -27,11 +27,13 @@ class CoarseEdges:
         rest: (3, e) end minus start in the rest shape S̄'.
         modes: (r, e) the same of Υ'.
         length: (e,) rest lengths.
+        middle: (3, e) their midpoints in S̄'.
     """
 
     rest: Array
     modes: Array
     length: Array
+    middle: Array
 
     def about(self, centre: Array) -> "CoarseEdges":
         """The same edges with the lengths of a rest shape refined to Λ̄' (3, r)."""

@@ -111,8 +111,9 @@ class Model:
         rest, modes = self.B[:3], self.B[3:-1]
         chosen = farthest_points(rest.T, vertices)
         edges = chosen[unique_edges(triangulate(rest[:2, chosen].T).faces)]
-        d = rest[:, edges[:, 1]] - rest[:, edges[:, 0]]
-        return CoarseEdges(d, modes[:, edges[:, 1]] - modes[:, edges[:, 0]], np.linalg.norm(d, axis=0))
+        start, end = edges.T
+        d, middle = rest[:, end] - rest[:, start], (rest[:, end] + rest[:, start]) / 2
+        return CoarseEdges(d, modes[:, end] - modes[:, start], np.linalg.norm(d, axis=0), middle)
 
 
 def build_model(

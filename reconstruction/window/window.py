@@ -21,6 +21,7 @@ from reconstruction.window.smoothness import deformation_change
 from reconstruction.window.solver import Solution, Solver, minimise
 from reconstruction.window.statistics import Statistics, image_statistics, stack
 from reconstruction.window.terms import data_normal
+from reconstruction.window.uncertainty.uncertainty import Uncertainty
 
 ADJUST = Solver()
 SHOW = Solver(tolerance=1e-2)  # for what is only shown: no later frame starts from it
@@ -47,6 +48,7 @@ class SlidingWindow:
         guides: energies to be minimised before `energy` where that alone might end on the wrong branch (`build_guides`).
             The window is then adjusted by the first of them; only the newest frame, before it is shown, by the others in
             turn and by `energy`.
+        uncertainty: whether estimates have standard deviations.
 
     Attributes:
         state: the window's frames; None before the first.
@@ -62,6 +64,7 @@ class SlidingWindow:
         *,
         refine: bool = False,
         guides: Sequence[Energy] = (),
+        uncertainty: bool = False,
     ) -> None:
         self.model = model
         self.state: State | None = None
@@ -77,6 +80,7 @@ class SlidingWindow:
         self._rest = Refinement(len(model.basis.eigenvalues))
         self._refine = refine
         self._switch: Switch | None = None  # of the newest frame
+        self._uncertainty = Uncertainty(model) if uncertainty else None
 
     def advance(self, W: Array, visible: Mask, expected: State | None = None) -> ShapeEstimate:
         """Add the next frame's points (2, p) px and adjust the window; returns the newest frame's shape.
@@ -103,7 +107,7 @@ class SlidingWindow:
         self.state = found.state
         if self._energy.adaptive:
             self._weigh_rest(self.state[-1:])
-        return replace(self.model.estimate(self.frames - 1, W, visible, self._as_shown(self.state)), switch=self._switch)
+        return replace(self._estimate(W, visible, self._as_shown(self.state)), switch=self._switch)
 
     def _near(self, W: Array, visible: Mask, expected: State) -> ShapeEstimate:
         """The next frame by itself, near to what is expected."""
@@ -116,7 +120,7 @@ class SlidingWindow:
         # The frame before stays for the prediction.
         self.state = found if self.state is None else join([self.state[-1:], found])
         self._data, self._before = [*self._data[-1:], data], None
-        return self.model.estimate(self.frames - 1, W, visible, found)
+        return self._estimate(W, visible, found)
 
     def restart(self) -> None:
         """The surface was lost: the next frame is tied to nothing, and starts from the rest or from the last shape."""
@@ -212,6 +216,14 @@ class SlidingWindow:
             solver = SHOW if energy is self._shown[-1] else GUIDE
             state = with_newest(state, self._newest(energy, state, solver))
         return state
+
+    def _estimate(self, W: Array, visible: Mask, state: State) -> ShapeEstimate:
+        """The newest frame of a state in units of shape and image."""
+        estimate = self.model.estimate(self.frames - 1, W, visible, state)
+        if self._uncertainty is None:
+            return estimate
+        energy = self._shown[-1] if self._shown else self._energy
+        return replace(estimate, sigma=self._uncertainty.sigma(energy, self._data[-1], state[-1:], W, visible))
 
     def _adjust(self, start: State) -> Solution:
         """The whole window adjusted."""
