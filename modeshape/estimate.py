@@ -1,6 +1,6 @@
 """The shape of the surface in one frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ class Estimate:
         visible: (P,) which points are seen.
         points_px: (P, 2) where they are seen; NaN where they are not.
         projection_px: (P, 2) where the shape projects them; NaN where the surface is lost.
+        sigma: (P,) standard deviation of each point's place in the shape, in its units, with `Settings(uncertainty=True)`;
+            else None, as where the surface is lost.
     """
 
     index: int
@@ -25,6 +27,7 @@ class Estimate:
     visible: NDArray[np.bool_]
     points_px: NDArray[np.float64]
     projection_px: NDArray[np.float64]
+    sigma: NDArray[np.float64] | None = field(default=None, kw_only=True)
 
     @property
     def lost(self) -> bool:

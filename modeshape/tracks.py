@@ -88,6 +88,7 @@ class Reconstruction:
                     visible=estimate.visible,
                     points_px=self._waiting.pop(0),
                     projection_px=estimate.projection_px,
+                    sigma=estimate.sigma,
                 )
             )
             self._done += 1

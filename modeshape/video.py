@@ -110,6 +110,7 @@ def _frame(one: Processed, number: int) -> Frame:
         visible=seen.visible if estimate is None else estimate.visible,
         points_px=np.where(seen.visible[:, None], seen.points_px, np.nan),
         projection_px=nothing[:, :2] if estimate is None else estimate.projection_px,
+        sigma=None if estimate is None else estimate.sigma,
         time_s=one.frame.time_s,
         image=one.frame.image,
         surface=number,

@@ -25,6 +25,8 @@ class Score:
         per_frame: (K,) e3d of each truth frame.
         frames: (K,) the truth frames scored.
         points: number of points scored.
+        error_over_sigma: true error of a vertex over its standard deviation, RMS over a frame, median over the frames; None
+            without standard deviations.
     """
 
     e3d: float
@@ -34,10 +36,11 @@ class Score:
     per_frame: Array
     frames: Indices
     points: int
+    error_over_sigma: float | None = None
 
 
-def score(shapes: Array, rest: Array, truth: Array, frames: Indices) -> Score:
-    """Compare shapes (K, 3, n) and the rest shape (3, n) with the true shapes (K, 3, n) of the given frames (K,)."""
+def score(shapes: Array, rest: Array, truth: Array, frames: Indices, sigma: Array | None = None) -> Score:
+    """Compare shapes (K, 3, n), with sigma (K, n), and rest shape (3, n) with true shapes (K, 3, n) of frames (K,)."""
     per_frame = e3d(shapes, truth)
     still = np.broadcast_to(rest, truth.shape)
     return Score(
@@ -48,6 +51,7 @@ def score(shapes: Array, rest: Array, truth: Array, frames: Indices) -> Score:
         per_frame=per_frame,
         frames=frames,
         points=truth.shape[2],
+        error_over_sigma=None if sigma is None else error_over_sigma(shapes, sigma, truth),
     )
 
 
@@ -57,6 +61,20 @@ def e3d(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = F
     `turned` grants each frame its best rotation, `sign_free` its own depth sign instead of one for all frames.
     """
     truth = truth - truth.mean(axis=2, keepdims=True)
+    off = aligned(shapes, truth, turned=turned, sign_free=sign_free)[0] - truth
+    return np.asarray(np.linalg.norm(off, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2)))
+
+
+def error_over_sigma(shapes: Array, sigma: Array, truth: Array) -> float:
+    """Errors of shapes (K, 3, n) against truth (K, 3, n) over their standard deviations (K, n); median over the frames."""
+    truth = truth - truth.mean(axis=2, keepdims=True)
+    placed, scale = aligned(shapes, truth)
+    squares = ((placed - truth) ** 2).sum(axis=1) / scale**2
+    return float(np.median(np.sqrt(squares.mean(axis=1) / (sigma**2).mean(axis=1))))
+
+
+def aligned(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = False) -> tuple[Array, float]:
+    """Shapes (K, 3, n) as near to truth (K, 3, n), centred, as they can be made, see `e3d`; and their scale."""
     shapes = shapes - shapes.mean(axis=2, keepdims=True)
     candidates = [shapes, MIRROR @ shapes]
     if turned:
@@ -64,11 +82,11 @@ def e3d(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = F
     if sign_free:  # both signs have the same size, so the one that correlates more is nearer at any scale
         ours, mirrored = ((S * truth).sum(axis=(1, 2)) for S in candidates)
         candidates = [np.where((ours >= mirrored)[:, None, None], *candidates)]
-    errors = []
-    for S in candidates:
-        S = S * ((S * truth).sum() / (S * S).sum())
-        errors.append(np.linalg.norm(S - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2)))
-    return min(errors, key=lambda error: float(error.mean()))
+    scales = [float((S * truth).sum() / (S * S).sum()) for S in candidates]
+    size = np.linalg.norm(truth, axis=(1, 2))
+    errors = [np.linalg.norm(scale * S - truth, axis=(1, 2)) / size for scale, S in zip(scales, candidates, strict=True)]
+    best = int(np.argmin([error.mean() for error in errors]))
+    return scales[best] * candidates[best], scales[best]
 
 
 def followed(
@@ -77,14 +95,15 @@ def followed(
     """Where truth points seen at truth_px (n, 2) in the first truth frame are on the moving mesh.
 
     Args:
-        shapes: K vertex positions (3, p) in the truth frames.
+        shapes: K vertex positions (3, p) in the truth frames, or more rows, of anything that goes with them.
         projections: their images (p, 2); only the first is used.
         rest: (3, p) rest shape.
         mesh: connectivity of the vertices.
         truth_px: (n, 2) pixels of the truth points in the first truth frame.
 
     Returns:
-        points (K, 3, m) and rest points (3, m), barycentric in the mesh; inside (n,) which truth points those are.
+        points (K, 3, m), with those rows, and rest points (3, m), barycentric in the mesh; inside (n,) which truth points
+        those are.
 
     Raises:
         ReconstructionError: no truth point lies in the mesh.

@@ -71,7 +71,9 @@ def write_run(path: Path, *, frames: int = 6, first_shape: int = 2, camera: Came
         observed = np.where(visible[:, None], projection + 0.5, np.nan)
         residual = np.where(visible, np.sqrt(0.5), np.nan)
         observations.append(Observation(observed, visible))
-        estimates.append(ShapeEstimate(index, q, R, origin[:2], 1.0, Lambda, shape, projection, residual, visible))
+        pose = q, R, origin[:2], 1.0
+        sigma = np.linspace(0.0, 8.0, len(pixels)) + index
+        estimates.append(ShapeEstimate(index, *pose, Lambda, shape, projection, residual, visible, sigma=sigma))
     run = Run(path, image, pixels, camera, mesh, basis, observations, estimates)
     configuration: Mapping[str, object] = {"source": "sheet.mp4", "modes": MODES}
     with Recording(path, configuration=configuration, size=SIZE, **options) as recording:  # type: ignore[arg-type]

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -72,10 +72,10 @@ class Collected:
         if not chosen:
             return None
         kept = [self.estimates[int(truth.frames[k])] for k in chosen]
-        shapes, still, inside = followed(
-            [e.shape for e in kept], [e.projection_px for e in kept], rest, mesh, truth.W_px[chosen[0]].T
-        )
-        return score(shapes, still, truth.S[chosen][:, :, inside], truth.frames[chosen])
+        known = [e.shape if e.sigma is None else np.vstack([e.shape, e.sigma]) for e in kept]
+        found, still, inside = followed(known, [e.projection_px for e in kept], rest, mesh, truth.W_px[chosen[0]].T)
+        sigma = found[:, 3] if found.shape[1] > 3 else None
+        return score(found[:, :3], still, truth.S[chosen][:, :, inside], truth.frames[chosen], sigma)
 
 
 @dataclass(frozen=True)
@@ -88,18 +88,32 @@ class Scores(Summary):
     e3d_sign_free: float
     truth_points: int
     truth_frames: int
+    error_over_sigma: float | None = None
 
     @classmethod
     def of(cls, result: Score) -> Self:
         """Without the errors of single frames."""
         return cls(
-            result.e3d, result.e3d_camera, result.e3d_static, result.e3d_sign_free, result.points, len(result.frames)
+            result.e3d,
+            result.e3d_camera,
+            result.e3d_static,
+            result.e3d_sign_free,
+            result.points,
+            len(result.frames),
+            result.error_over_sigma,
         )
+
+
+def sigmas(estimates: Iterable[ShapeEstimate]) -> Array | None:
+    """Standard deviations (F, P) of the vertices; None if they were not asked for."""
+    known = [e.sigma for e in estimates if e.sigma is not None]
+    return np.stack(known) if known else None
 
 
 def save_shapes(path: Path, estimates: Mapping[int, ShapeEstimate], model: Model, lost: Iterable[int] = ()) -> None:
     """Write S (F, 3, P) camera axes, pixels; R, s, t, Lambda, faces, visible, frames, and the basis they refer to.
 
+    And sigma (F, P), the standard deviations of the vertices, if they were asked for.
     Frames in which the surface was lost get rows of NaN.
 
     Raises:
@@ -108,25 +122,27 @@ def save_shapes(path: Path, estimates: Mapping[int, ShapeEstimate], model: Model
     frames = sorted({*estimates, *lost})
     nothing = without_shape(next(iter(estimates.values())))
     rows = [estimates.get(frame, nothing) for frame in frames]
-    basis = model.basis
+    basis, sigma = model.basis, sigmas(rows)
+    arrays: dict[str, Any] = {
+        "S": np.stack([e.shape for e in rows]),
+        "R": np.stack([e.R for e in rows]),
+        "s": np.array([e.s for e in rows]),
+        "t": np.stack([e.t for e in rows]),
+        "Lambda": np.stack([e.Lambda for e in rows]),
+        "visible": np.stack([e.visible for e in rows]),
+        "frames": np.array(frames),
+        "faces": model.mesh.faces,
+        "rest": basis.rest,
+        "Upsilon": basis.Upsilon,
+        "eigenvalues": basis.eigenvalues,
+        "Phi": basis.Phi,
+        "K": model.camera.K,
+        "perspective": model.camera.perspective,
+    }
+    if sigma is not None:
+        arrays["sigma"] = sigma
     with writable(path) as file:
-        np.savez_compressed(
-            file,
-            S=np.stack([e.shape for e in rows]),
-            R=np.stack([e.R for e in rows]),
-            s=np.array([e.s for e in rows]),
-            t=np.stack([e.t for e in rows]),
-            Lambda=np.stack([e.Lambda for e in rows]),
-            visible=np.stack([e.visible for e in rows]),
-            frames=np.array(frames),
-            faces=model.mesh.faces,
-            rest=basis.rest,
-            Upsilon=basis.Upsilon,
-            eigenvalues=basis.eigenvalues,
-            Phi=basis.Phi,
-            K=model.camera.K,
-            perspective=model.camera.perspective,
-        )
+        np.savez_compressed(file, **arrays)
 
 
 def without_shape(like: ShapeEstimate) -> ShapeEstimate:
@@ -146,4 +162,5 @@ def without_shape(like: ShapeEstimate) -> ShapeEstimate:
         projection_px=nan(like.projection_px),
         residual_px=nan(like.residual_px),
         visible=np.zeros_like(like.visible),
+        sigma=None if like.sigma is None else nan(like.sigma),
     )

@@ -12,7 +12,7 @@ from app.arrays import Array, Flags
 from app.files.mesh_file import rest_of_vertices
 from app.files.writing import check_free
 from app.options.evaluate import Evaluate
-from app.pipeline.estimates import Collected, Scores, save_shapes
+from app.pipeline.estimates import Collected, Scores, save_shapes, sigmas
 from app.pipeline.prepare import RECOVERED, settings_of
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
@@ -86,10 +86,12 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
     scores = before = None
     if tracks.S_gt is not None and tracks.gt_frames is not None:
         truth = tracks.S_gt, tracks.gt_frames
-        scores, before = (
-            Scores.of(score(np.stack([made[int(f)].shape for f in tracks.gt_frames]), rest.motion.shape, *truth))
-            for made in (estimates, online)
-        )
+
+        def scored(made: list[ShapeEstimate]) -> Scores:
+            kept = [made[int(f)] for f in truth[1]]
+            return Scores.of(score(np.stack([e.shape for e in kept]), rest.motion.shape, *truth, sigmas(kept)))
+
+        scores, before = scored(estimates), scored(online)
     camera = reconstruction.camera
     return Evaluation(
         tracks=str(config.tracks),

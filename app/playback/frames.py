@@ -1,7 +1,7 @@
 """The frames of a recording: where its points were seen in them, and their estimates by one model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -75,24 +75,30 @@ class Estimates:
         t: (F, 2) px.
         s: (F,).
         Lambda: (F, 3, r) px.
+        sigma: (F, P) standard deviations of the vertices; NaN if they were not asked for.
     """
 
     quaternion: Array
     t: Array
     s: Array
     Lambda: Array
+    sigma: Array
 
     def of(self, i: int, model: Model, W: Array, visible: Flags) -> ShapeEstimate:
         """Shape and pose of row i, by the model they are of; W (2, P) px, visible (P,)."""
         q = quaternion_from_rotation(rotation_from_quaternion(self.quaternion[i]) @ model.basis.Phi)
         t, log_s = self.t[i] / model.radius_px, np.log(self.s[i])
-        return model.estimate(i, W, visible, State(q[None], t[None], np.array([log_s]), self.Lambda[i][None] / model.unit))
+        state = State(q[None], t[None], np.array([log_s]), self.Lambda[i][None] / model.unit)
+        sigma = self.sigma[i] if np.isfinite(self.sigma[i]).all() else None
+        return replace(model.estimate(i, W, visible, state), sigma=sigma)
 
 
 def read_estimates(rows: Rows, entity: str, frames: Sequence[int], models: Sequence[Model]) -> Estimates:
     """The estimates of frames by the last model; what was shown by an earlier one is as near as this comes to it."""
     modes = [len(model.basis.eigenvalues) for model in models] or [0]
-    found = Estimates(*(np.full((len(frames), *size), np.nan) for size in ((4,), (2,), (), (3, modes[-1]))))
+    points = models[-1].basis.rest.shape[1] if models else 0
+    found = Estimates(*(np.full((len(frames), *size), np.nan) for size in ((4,), (2,), (), (3, modes[-1]), (points,))))
+    unsure = rows.last(entity, f"{ESTIMATE}sigma")
     values = {name: rows.last(entity, f"{ESTIMATE}{name}") for name in ("quaternion", "t", "s", "Lambda", "model")}
     if not models:
         return found
@@ -102,11 +108,13 @@ def read_estimates(rows: Rows, entity: str, frames: Sequence[int], models: Seque
         q, t, s, Lambda, number = (np.asarray(cast(Array, one[frame].value)) for one in values.values())
         model = models[int(number[0])]
         if model is not models[-1]:
-            single = Estimates(q[None], t[None], s, Lambda.reshape(1, 3, -1))
+            single = Estimates(q[None], t[None], s, Lambda.reshape(1, 3, -1), np.full((1, points), np.nan))
             nothing = np.zeros(model.basis.rest.shape[1], np.bool_)
             seen = translated(models[-1], model, single.of(0, model, np.zeros((2, len(nothing))), nothing))
             q, t, s, Lambda = seen.quaternion, seen.t, np.array([seen.s]), seen.Lambda
         found.quaternion[i], found.t[i], found.s[i], found.Lambda[i] = q, t, s[0], Lambda.reshape(3, -1)
+        if frame in unsure:
+            found.sigma[i] = cast(Array, unsure[frame].value)
     return found
 
 

@@ -3,7 +3,7 @@
 import csv
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -35,7 +35,7 @@ def write_npz(playback: Playback, file: BinaryIO, advance: Callable[[], None]) -
     Lambda (F, 3, r), visible (F, P), frames (F,), faces (m, 3), rest (3, P), Upsilon (r, P), eigenvalues (r,), Phi (3, 3),
     K (3, 3), perspective. Besides: W (F, 2, P) observed px, NaN where not visible; projection (F, 2, P) px of the
     shapes; times_s (F,); quaternion (F, 4) of R, w first; camera_R, camera_position (see `camera_path`);
-    texture_px (P, 2) the points in the first frame.
+    texture_px (P, 2) the points in the first frame; with --uncertainty sigma (F, P).
     """
     rows = np.flatnonzero(playback.shaped | (np.array([phase.lower() for phase in playback.phases]) == "lost"))
     shapes = np.full((len(rows), *playback.basis.rest.shape), np.nan)
@@ -44,41 +44,44 @@ def write_npz(playback: Playback, file: BinaryIO, advance: Callable[[], None]) -
         if estimate := playback.estimate(row):
             shapes[k], projections[k] = estimate.shape, estimate.projection_px.T
         advance()
-    basis, camera = playback.basis, playback.camera
+    basis, camera, sigma = playback.basis, playback.camera, playback.estimates.sigma[rows]
     camera_R, camera_position = camera_path(playback, rows)
-    np.savez_compressed(
-        file,
-        S=shapes,
-        R=camera_R.transpose(0, 2, 1),
-        s=playback.estimates.s[rows],
-        t=playback.estimates.t[rows],
-        Lambda=playback.estimates.Lambda[rows],
-        visible=playback.visible[rows],
-        frames=playback.frames[rows],
-        faces=playback.mesh.faces,
-        rest=basis.rest,
-        Upsilon=basis.Upsilon,
-        eigenvalues=basis.eigenvalues,
-        Phi=basis.Phi,
-        K=camera.K,
-        perspective=camera.perspective,
-        W=playback.W[rows],
-        projection=projections,
-        times_s=playback.times_s[rows],
-        quaternion=playback.estimates.quaternion[rows],
-        camera_R=camera_R,
-        camera_position=camera_position,
-        texture_px=playback.texture_px,
-    )
+    arrays: dict[str, Any] = {
+        "S": shapes,
+        "R": camera_R.transpose(0, 2, 1),
+        "s": playback.estimates.s[rows],
+        "t": playback.estimates.t[rows],
+        "Lambda": playback.estimates.Lambda[rows],
+        "visible": playback.visible[rows],
+        "frames": playback.frames[rows],
+        "faces": playback.mesh.faces,
+        "rest": basis.rest,
+        "Upsilon": basis.Upsilon,
+        "eigenvalues": basis.eigenvalues,
+        "Phi": basis.Phi,
+        "K": camera.K,
+        "perspective": camera.perspective,
+        "W": playback.W[rows],
+        "projection": projections,
+        "times_s": playback.times_s[rows],
+        "quaternion": playback.estimates.quaternion[rows],
+        "camera_R": camera_R,
+        "camera_position": camera_position,
+        "texture_px": playback.texture_px,
+    }
+    if np.isfinite(sigma).any():
+        arrays["sigma"] = sigma
+    np.savez_compressed(file, **arrays)
 
 
 def write_csv(playback: Playback, folder: Path, advance: Callable[[], None]) -> None:
     """Four tables, every frame of the recording; what is not known is left empty.
 
     points.csv: frame, time_s, point, visible, observed_x/y px, projected_x/y px, x, y, z of the shape (camera axes,
-    pixels of the first frame), one line for each point of each frame. frames.csv: frame, time_s, phase, and the pose
-    of the object: qw, qx, qy, qz, tx, ty px, s; camera_x/y/z and camera_qw … qz: the camera in the axes of the rest
-    shape. lambda.csv: frame, time_s, alpha_1 … tau_r px. mesh.csv: the triangles' points a, b, c.
+    pixels of the first frame), sigma (their standard deviation, with --uncertainty), one line for each point of each
+    frame. frames.csv: frame, time_s, phase, and the pose of the object: qw, qx, qy, qz, tx, ty px, s; camera_x/y/z and
+    camera_qw … qz: the camera in the axes of the rest shape. lambda.csv: frame, time_s, alpha_1 … tau_r px. mesh.csv:
+    the triangles' points a, b, c.
     """
     shaped = np.flatnonzero(playback.shaped)
     _, positions = camera_path(playback, shaped)
@@ -110,12 +113,12 @@ def write_csv(playback: Playback, folder: Path, advance: Callable[[], None]) -> 
             estimate = playback.estimate(i)
             unknown = np.full((playback.W.shape[2], 5), np.nan)
             shape = unknown if estimate is None else np.column_stack([estimate.projection_px, estimate.shape.T])
-            values = np.column_stack([playback.W[i].T, shape])
+            values = np.column_stack([playback.W[i].T, shape, playback.estimates.sigma[i]])
             for point, (visible, row) in enumerate(zip(playback.visible[i], values.tolist(), strict=True)):
                 yield [*times[i], point, int(visible), *cells(row)]
             advance()
 
-    columns = ["observed_x", "observed_y", "projected_x", "projected_y", "x", "y", "z"]
+    columns = ["observed_x", "observed_y", "projected_x", "projected_y", "x", "y", "z", "sigma"]
     table(folder / "points.csv", ["frame", "time_s", "point", "visible", *columns], point_rows())
 
 

@@ -34,12 +34,14 @@ Every frame:
 
 Every frame with a shape:
 
-- `world/mesh`: Mesh3D vertex_positions (p, 3) float32, camera axes, pixels of the first frame.
+- `world/mesh`: Mesh3D vertex_positions (p, 3) float32, camera axes, pixels of the first frame; with
+  `--uncertainty` vertex_colors, which the viewer multiplies the texture by: the redder, the less sure.
 - `world/camera/wireframe`: LineStrips2D, the reprojected mesh in px: the vertices in the order of
   `strips`.
 - `world/camera/points/predicted`: Points2D, not seen; drawn where the model says they are.
 - `estimate`: modeshape.Estimate with quaternion (4) w first, t (2) px, s, Lambda (3r), visible (p) bool, and model
-  int64, the n of the model that it is of.
+  int64, the n of the model that it is of; with `--uncertainty` sigma (p), standard deviations of the vertices, in units of
+  the shape.
 - `online`: the same as it was shown on the way, before a final pass; there if that was to be kept.
 - `quality/error`: Scalars, RMS and median reprojection error, px.
 - `coefficients/spectrum`: BarChart, Λ (3r): Γ_α, Γ_β, Γ_τ side by side.

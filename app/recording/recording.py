@@ -17,6 +17,7 @@ from app.recording import entities
 from app.recording.images import cropped, embedded_video, jpeg, texture
 from app.recording.stream import Stream
 from app.recording.styles import LEADING, coefficient_styles, placement, styles
+from app.recording.uncertainty import colors
 from app.recording.viewer import running_viewer, spawned_viewer
 from app.recording.wireframe import edge_strips, line_strips
 from app.terminal.errors import UsageError
@@ -161,18 +162,14 @@ class Recording:
         if not self._placed:
             self._stream.static(placement(vertices, self._camera, self._size))
             self._placed = True
+        known = {name: getattr(estimate, name) for name in ("quaternion", "t", "s", "visible")}
+        if estimate.sigma is not None:
+            known["sigma"] = estimate.sigma
         for entity in self._estimates:
-            self._stream.values(
-                entity,
-                "Estimate",
-                quaternion=estimate.quaternion,
-                t=estimate.t,
-                s=estimate.s,
-                Lambda=estimate.Lambda.ravel(),
-                visible=estimate.visible,
-                model=self._models - 1,
-            )
-        self._stream.log(entities.MESH, rr.Mesh3D.from_fields(vertex_positions=vertices.astype(np.float32)))
+            self._stream.values(entity, "Estimate", Lambda=estimate.Lambda.ravel(), model=self._models - 1, **known)
+        tint = colors(estimate.sigma, estimate.shape)
+        mesh = rr.Mesh3D.from_fields(vertex_positions=vertices.astype(np.float32), vertex_colors=tint)
+        self._stream.log(entities.MESH, mesh)
         self._stream.log(entities.WIREFRAME, line_strips(projection, self._strips))
         self._stream.points(entities.PREDICTED, projection[~estimate.visible])
         self._stream.points(entities.LOST, NOWHERE)

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+from app.options.evaluate import Evaluate
+from app.options.model import Model
 from app.reproduce.experiment import Experiment
 from app.reproduce.lines import FACE, FLAG, FLAG_PERSPECTIVE, FLAG_RIGID
 from app.reproduce.published import PAPER, PAPER_BATCH_E3D, PAPER_E3D, PAPER_MISSING, PAPER_MODES, PAPER_SEQUENTIAL_E3D
@@ -30,6 +32,7 @@ COLUMNS = (
     "with auto",
     "ms/frame",
 )
+CALIBRATED = ("flag250", "flag250_perspective", "face37", "waving_3", "waving_5", "waving_7", "waving_9")
 
 
 def accuracy(work: Work) -> Result:
@@ -64,12 +67,27 @@ def accuracy(work: Work) -> Result:
         ("method", "e3d %"),
         [("BA-MSI-ED", PAPER_E3D), ("sequential competitor", PAPER_SEQUENTIAL_E3D), ("batch methods", f"{low}–{high}")],
     )
-    return Result([Table("Error against the true shapes", COLUMNS, rows), published], remarks=remarks, headlines=headlines)
+    tables = [Table("Error against the true shapes", COLUMNS, rows), published]
+    if not work.effort.quick:
+        tables.append(calibration(work))
+    return Result(tables, remarks=remarks, headlines=headlines)
 
 
-def steps(_effort: Effort) -> int:
-    """Two trials a line."""
-    return 2 * len(LINES)
+def calibration(work: Work) -> Table:
+    """True errors over standard deviations, nothing chosen."""
+    rows = []
+    for name in CALIBRATED:
+        path = work.data / f"{name}.npz"
+        if path.is_file():
+            trial = work.evaluated(Evaluate(path, model=Model(uncertainty=True)))
+            rows.append((name, percent(trial["e3d"]), trial["error_over_sigma"]))
+    columns = ("data", "e3d %", "true error / standard deviation")
+    return Table("Standard deviations of the vertices (`--uncertainty`): RMS of a frame, its median", columns, rows)
+
+
+def steps(effort: Effort) -> int:
+    """Two trials a line, and those of the standard deviations."""
+    return 2 * len(LINES) + (0 if effort.quick else len(CALIBRATED))
 
 
 EXPERIMENT = Experiment(

@@ -1,23 +1,22 @@
-"""How far off a shape may be: a standard deviation for each vertex, calibrated by what earlier frames leave over.
+"""How far off a shape may be: a standard deviation for each vertex, calibrated by what the frame's energy leaves over.
 
 A frame's energy is E = Σ_k E_k, k the images, the lengths of edges, and the pull to rest, with Gauss-Newton Hessians H_k
 and H = Σ_k H_k. Each is a sum of squares whose variance per unit weight is
 
     τ_k = E_k / (n_k − tr H⁻¹H_k)
 
-with n_k independent terms (Förstner's variance components), and an estimate that weighs them as E does has the covariance
+with n_k independent residuals (Förstner's variance components), and an estimate that weighs them as E does has the
+covariance
 
     C = H⁻¹ (Σ_k τ_k H_k) H⁻¹.
 
-Neighbours' residuals are alike, since most of them is what the modes leave out: n_k is the number of terms over the
-variance of their sums in small patches, in units of that of independent ones. Besides, a vertex has what the modes leave
-out itself: the part of its residuals that the nearest vertex shares. In depth that is as much more as the last modes are
-higher there.
+Neighbours' residuals are alike, since most of them is what the modes leave out: n_k is the number of residuals over the
+variance of their sums in small patches, in units of that of independent ones. What the modes leave out is missing from the
+vertices, too (`variances.left_out`).
 
-Neighbouring frames count for nothing: their errors are alike, too. The rest shape is taken as exact.
+Neighbouring frames count for nothing, since their errors are alike, too. The rest shape is taken as exact, and so is the
+side to which it bends: before an orthographic camera the mirror image may be the truth.
 """
-
-from dataclasses import replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,31 +28,28 @@ from reconstruction.basis.model import Model
 from reconstruction.camera import rotation_from_quaternion
 from reconstruction.state import POSE, State
 from reconstruction.window.energy import Energy
-from reconstruction.window.normal import Normal
 from reconstruction.window.robust import robust_weights
 from reconstruction.window.statistics import Statistics
-from reconstruction.window.terms import HAT, linearise
-from reconstruction.window.uncertainty.variances import Variances
+from reconstruction.window.terms import HAT
+from reconstruction.window.uncertainty.variances import alike, left_out, parts, variance
 
 PATCHES_PER_MODE = 2  # of points, so that a patch is smaller than what the modes follow; of edges, which are fewer, half
-LAST_MODES = 0.3  # of the modes, that tell what those left out are like
 RIDGE = 1e-12  # of the mean diagonal, where neither image nor prior holds a parameter
 
 
 class Uncertainty:
-    """Standard deviations of the vertices, frame by frame; one public verb.
+    """Standard deviations of the vertices; one public verb.
 
     Args:
         model: the rest shape and its modes.
     """
 
     def __init__(self, model: Model) -> None:
-        self._model, self._variances = model, Variances()
-        places = model.B[:3].T
+        self._model = model
         self._modes = len(model.basis.eigenvalues)
+        places = model.B[:3].T
         self._patch = patches(places, PATCHES_PER_MODE * self._modes)
         self._nearest = np.asarray(cKDTree(places).query(places, k=2)[1], np.int64)[:, 1]
-        self._edge_patch: Indices | None = None
 
     def sigma(self, energy: Energy, data: Statistics, state: State, W: Array, visible: Mask) -> Array:
         """Standard deviation (p,) of each vertex's distance from its true place, in units of the shape.
@@ -67,53 +63,31 @@ class Uncertainty:
             W: (2, p) px; anything where not visible.
             visible: (p,).
         """
-        hessians = self._weigh(energy, data, state, W, visible)
-        inverse = inverted(hessians.sum(axis=0))
-        meat = np.tensordot(self._variances.per_weight(), hessians, axes=1)
-        values, vectors = np.linalg.eigh(inverse @ meat @ inverse)
-        J = self._derivatives(energy, state) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
-        variance = (J**2).sum(axis=(0, 2)) + self._variances.left_out()
-        unit = self._model.radius if self._model.camera.perspective else self._model.radius_px * np.exp(state.log_s[0])
-        return np.asarray(unit * np.sqrt(variance))
+        size = float(np.exp(state.log_s[0]))
+        residuals = np.where(visible, self._model.residuals(W, state), 0.0) / (self._model.radius_px * size)
+        weights = robust_weights(residuals, visible)
+        values, hessians = parts(energy, data, state)
+        ridge = RIDGE * np.trace(hessians.sum(axis=0)) / hessians.shape[1]
+        inverse = np.linalg.inv(hessians.sum(axis=0) + ridge * np.eye(hessians.shape[1]))
+        counts = (
+            2 * weights.sum() / alike(weights * residuals, self._patch),
+            self._independent_edges(energy, state),
+            len(energy.rows) * self._modes,
+        )
+        taken = np.einsum("ij,kji->k", inverse, hessians)
+        tau = np.array([variance(*one) for one in zip(values, counts, taken, strict=True)])
+        spread, axes = np.linalg.eigh(inverse @ np.tensordot(tau, hessians, axes=1) @ inverse)
+        moved = self._derivatives(energy, state) @ (axes * np.sqrt(spread.clip(0.0)))
+        missing = left_out(state.Lambda[0] - energy.centre, state, residuals, weights, self._nearest)
+        unit = self._model.radius if self._model.camera.perspective else self._model.radius_px * size
+        return np.asarray(unit * np.sqrt((moved**2).sum(axis=(0, 2)) + missing))
 
-    def _weigh(self, energy: Energy, data: Statistics, state: State, W: Array, visible: Mask) -> Array:
-        """Hessians (3, d, d) of the terms at a frame, which is added to the variances."""
-        terms = normals(energy, data, state)
-        hessians = np.stack([term.diagonal[0] for term in terms])
-        inverse = inverted(hessians.sum(axis=0))
-        variances = self._variances
-        variances.frames += 1
-        variances.energy += [term.value[0] for term in terms]
-        variances.taken += np.einsum("ij,kji->k", inverse, hessians)
-        left = np.where(visible, self._model.residuals(W, state), 0.0) / (self._model.radius_px * np.exp(state.log_s[0]))
-        weights = robust_weights(left, visible)
-        self._compare(0, weights * left, self._patch)
-        variances.count += [2 * weights.sum(), 0, len(energy.rows) * self._modes]
-        if energy.edges is not None:
-            if self._edge_patch is None:
-                self._edge_patch = patches(energy.edges.middle.T, PATCHES_PER_MODE * self._modes // 2)
-            strain = energy.edges.strain(energy.edges.vectors(state.Lambda))
-            self._compare(1, strain, self._edge_patch)
-            variances.count[1] += strain.size
-        self._compare_nearest(left, weights)
-        variances.misfit += float((weights * left**2).sum() / max(2 * weights.sum(), 1e-300))
-        deformation = state.Lambda[0] - energy.centre
-        last = (deformation[:, -max(1, round(LAST_MODES * self._modes)) :] ** 2).sum(axis=1)
-        variances.last += last
-        variances.shown += float((rotation_from_quaternion(state.q[0])[:2] ** 2).sum(axis=0) @ last) / 2
-        return hessians
-
-    def _compare(self, term: int, residuals: Array, patch: Indices) -> None:
-        """Residuals (k, n) of points or edges: squared sums in patches (n,), and sums of squares."""
-        sums = np.stack([np.bincount(patch, row) for row in residuals])
-        self._variances.patches[term] += (sums**2).sum()
-        self._variances.squares[term] += (residuals**2).sum()
-
-    def _compare_nearest(self, left: Array, weights: Array) -> None:
-        both = weights * weights[self._nearest]
-        other = left[:, self._nearest]
-        self._variances.shared += float((both * left * other).sum())
-        self._variances.paired += float((both * (left**2 + other**2)).sum()) / 2
+    def _independent_edges(self, energy: Energy, state: State) -> float:
+        """As how many edges those whose lengths are kept count."""
+        if energy.edges is None:
+            return 0.0
+        strain = energy.edges.strain(energy.edges.vectors(state.Lambda))
+        return strain.size / alike(strain, patches(energy.edges.middle.T, PATCHES_PER_MODE * self._modes // 2))
 
     def _derivatives(self, energy: Energy, state: State) -> Array:
         """Derivatives (3, p, d) of the vertices' places by the frame's parameters, without shift and turn of the whole."""
@@ -133,26 +107,6 @@ class Uncertainty:
         flat = J.reshape(-1, J.shape[2])
         turns = np.linalg.qr(flat[:, :3])[0]
         return np.asarray((flat - turns @ (turns.T @ flat)).reshape(J.shape))
-
-
-def normals(energy: Energy, data: Statistics, state: State) -> tuple[Normal, Normal, Normal]:
-    """Value and Hessian of images, edges, and what pulls to rest, without what couples frames."""
-    images = replace(energy, rest=0.0, edges=None, residuals=())
-    parts = [linearise(part, data, state, None) for part in (images, replace(images, edges=energy.edges), energy)]
-    return parts[0], without(parts[1], parts[0]), without(parts[2], parts[1])
-
-
-def without(normal: Normal, part: Normal) -> Normal:
-    """What a part leaves of normal equations."""
-    return Normal(
-        normal.value - part.value, normal.gradient - part.gradient, normal.diagonal - part.diagonal, normal.coupling
-    )
-
-
-def inverted(hessian: Array) -> Array:
-    """Inverse of a positive semi-definite matrix, directions that nothing holds damped."""
-    ridge = RIDGE * np.trace(hessian) / len(hessian)
-    return np.asarray(np.linalg.inv(hessian + ridge * np.eye(len(hessian))))
 
 
 def patches(places: Array, count: int) -> Indices:

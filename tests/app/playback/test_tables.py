@@ -19,7 +19,15 @@ def test_npz_is_what_the_run_had(tmp_path: Path, which: str, request: pytest.Fix
     run: Run = request.getfixturevalue(which)
     with np.load(exported(run.path, "npz", tmp_path)) as stored:
         values = dict(stored)
-    for key, name in (("S", "shape"), ("R", "R"), ("s", "s"), ("t", "t"), ("Lambda", "Lambda"), ("visible", "visible")):
+    for key, name in (
+        ("S", "shape"),
+        ("R", "R"),
+        ("s", "s"),
+        ("t", "t"),
+        ("Lambda", "Lambda"),
+        ("visible", "visible"),
+        ("sigma", "sigma"),
+    ):
         expected = np.stack([getattr(estimate, name) for estimate in run.estimates])
         assert values[key] == pytest.approx(expected, rel=1e-9, abs=1e-6), key
     assert np.array_equal(values["faces"], run.mesh.faces)
@@ -68,6 +76,7 @@ def test_csv_has_points_poses_and_coefficients(tmp_path: Path, run: Run) -> None
         assert float(row["projected_x"]) == pytest.approx(estimate.projection_px[point, 0], rel=1e-6)
         xyz = [float(row[axis]) for axis in "xyz"]
         assert xyz == pytest.approx(estimate.shape[:, point], rel=1e-6)
+        assert float(row["sigma"]) == pytest.approx(estimate.sigma[point])
     frames, coefficients = read(folder / "frames.csv"), read(folder / "lambda.csv")
     assert [row["phase"] for row in frames] == ["bootstrap"] * 2 + ["tracking"] * 4
     assert float(frames[3]["qw"]) == pytest.approx(run.estimates[3].quaternion[0])

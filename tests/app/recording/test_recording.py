@@ -1,6 +1,7 @@
 """What a recording holds, read back with Rerun."""
 
 import json
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -34,10 +35,27 @@ def test_estimates_come_back_exactly(run: Run, rows: Rows) -> None:
             ("s", [estimate.s]),
             ("Lambda", estimate.Lambda.ravel()),
             ("visible", estimate.visible),
+            ("sigma", estimate.sigma),
         ):
             np.testing.assert_array_equal(rows[entities.ESTIMATE, f"modeshape.Estimate:{name}"][index], value)
         vertices = np.array(rows[entities.MESH, "Mesh3D:vertex_positions"][index])
         np.testing.assert_allclose(vertices, estimate.shape.T, rtol=1e-6, atol=1e-5)
+
+
+def test_what_is_unsure_is_red(run: Run, rows: Rows, tmp_path: Path) -> None:
+    colors = np.array(rows[entities.MESH, "Mesh3D:vertex_colors"][0], np.uint32)
+    red, green, blue = ((colors >> shift) & 255 for shift in (24, 16, 8))
+    assert (red == 255).all()
+    assert green[0] == blue[0] == 255
+    assert (np.diff(green.astype(int)) <= 0).all()
+    assert green[-1] < 64
+    path = tmp_path / "sure.rrd"
+    with record(path) as recording:
+        recording.observe(Frame(0, 0.0, run.picture), run.observations[0], phase="tracking")
+        recording.rest(run.basis, run.mesh, run.camera, run.picture, run.pixels)
+        recording.estimate(0, 0.0, replace(run.estimates[0], sigma=None))
+    names = {name for _, name in read(path)}
+    assert not names & {"Mesh3D:vertex_colors", "modeshape.Estimate:sigma"}
 
 
 def test_observations_come_back(run: Run, rows: Rows) -> None:
