@@ -1,8 +1,9 @@
-"""`modeshape retexture`: a picture on the moving surface, from a recording or live while a video is tracked."""
+"""`modeshape retexture`: a picture on the moving surface: in a recording, in a video, or live while a camera is tracked."""
 
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import cast
 
 import cv2
@@ -25,7 +26,7 @@ from app.terminal.interrupts import completed
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary
 from tracking.klt import Observation
-from tracking.video import Frame
+from tracking.video import Frame, Video
 
 RRD_MAGIC = b"RRF"
 STILL_PX = 1.0
@@ -78,12 +79,38 @@ def retexture(command: Retexture, progress: Progress) -> Painted:
     check_free(command.out, overwrite=command.overwrite)
     placement = Placement(command.place, command.opacity)
     with Texture(command.texture) as texture, Painter(command.out, texture, placement) as painter:
-        on = (play if is_recording(command.source) else follow)(command, painter, progress)
+        way = play if is_recording(command.source) else follow if command.run.live else reconstruct
+        on = way(command, painter, progress)
     return Painted(on, painter.painted, painter.milliseconds, command.out)
 
 
+def reconstruct(command: Retexture, painter: Painter, progress: Progress) -> RunSummary:
+    """Paint the frames of a video file, once its last one has told all there is to know of the surface.
+
+    Raises:
+        UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
+    """
+    run = command.run
+    with TemporaryDirectory() as folder:
+        kept = command.rrd is not None
+        output = replace(run.output, out=command.rrd or Path(folder) / "run.rrd", image="jpeg" if kept else "none")
+        session = Session(replace(run, output=output), progress)
+        summary = session.run()
+        with Video(run.source, *run.frame_range, duration_s=run.duration) as video, progress:
+            progress.expect(summary.frames)
+            frames = iter(video)
+            for playback in (Playback.load(path) for path in session.recordings):
+                for i, frame in zip(range(len(playback.frames)), frames, strict=False):
+                    if i == 0 and playback.recorded_model is not None:
+                        painter.begin(frame, playback.texture_px, playback.model, video.fps)
+                    estimate = playback.estimate(i) if playback.recorded_model is not None else None
+                    painter.frame(frame, Observation(playback.W[i].T, playback.visible[i]), estimate)
+                    progress.advance("painting")
+    return summary if kept else replace(summary, recording=None)
+
+
 def follow(command: Retexture, painter: Painter, progress: Progress) -> RunSummary:
-    """Paint the frames of a video while it is tracked.
+    """Paint the frames of a camera or stream while it is tracked.
 
     Raises:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.

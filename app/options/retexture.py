@@ -11,11 +11,11 @@ from app.options.shared import Json, Overwrite
 
 @dataclass(frozen=True, kw_only=True)
 class Retexture(Json, Overwrite, Source):
-    """Put a picture or a video on the moving surface in a recording, or live in a video while it is tracked.
+    """Put a picture or a video on the moving surface in a recording, a video file, or live in what a camera sees.
 
-    It lies in the scene's light, and behind what is in front of the surface. When a video being tracked cuts to
-    another scene, frames stay as they are. The options of `run` are only for videos, but for --frames, --place and
-    --opacity.
+    A file is painted once all of it has been reconstructed. The picture lies in the scene's light, and behind what is in
+    front of the surface; after a cut to another scene, frames stay as they are. The options of `run` are only for videos,
+    but for --frames, --place and --opacity.
 
     Examples:
       modeshape retexture recordings/demo.rrd --texture poster.png --out poster.mp4

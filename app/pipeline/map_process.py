@@ -11,7 +11,6 @@ from typing import Any, Self
 from app.child import child, connection_to_parent
 from app.terminal.errors import UsageError
 
-
 NICE = 5  # frames go first
 
 

@@ -29,7 +29,7 @@ from tracking.video import Frame, Video
 
 
 class Session:
-    """One run of the pipeline over a video: one object, and another when that does not come back.
+    """A run over a video: one object, and another when that does not come back.
 
     Args:
         config: what the person asked for.
@@ -38,6 +38,7 @@ class Session:
 
     Attributes:
         fps: announced rate of the video, once the frames have begun.
+        recordings: the files written so far.
         interrupted: whether the run ends early; whoever sets it ends the run with the next frame.
         summary: once the frames have ended: counts of the whole run, and what came out for the first object.
 
@@ -55,7 +56,7 @@ class Session:
         self._messages: list[str] = []  # of the source, to be recorded with the next frame
         self._surface: Surface | None = None
         self._successor: Successor | None = None
-        self._paths: list[Path | None] = []
+        self.recordings: list[Path] = []
         self.fps, self.interrupted = 0.0, False
 
     def run(self) -> RunSummary:
@@ -225,10 +226,10 @@ class Session:
     def _open_recording(self, frame: Frame) -> None:
         """Write another recording from a frame on: the first, of another object, or the next part of a long one."""
         self._opened_s = frame.time_s
-        path, part = self._path, len(self._paths) + 1
+        path, part = self._path, len(self.recordings) + 1
         if path is not None and part > 1:
             path = beside(path, f"part{part}", overwrite=self._config.output.overwrite)
-        self._paths.append(path)
+        self.recordings += [path] if path else []
         self._recording.tell("open", path, **self._object.recording_options)
 
     def _split_recording(self, frame: Frame) -> None:
@@ -246,4 +247,4 @@ class Session:
 
     def _summary(self, tracked: TrackedObject) -> RunSummary:
         """What is known of the whole run, and of one object."""
-        return summary_of(tracked, self._counts, self._watch, self._paths, interrupted=self.interrupted)
+        return summary_of(tracked, self._counts, self._watch, self.recordings, interrupted=self.interrupted)

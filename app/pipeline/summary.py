@@ -131,13 +131,13 @@ class RunSummary(Summary):
 
 
 def summary_of(
-    tracked: TrackedObject, counts: Counts, watch: Stopwatch, recordings: Sequence[Path | None], *, interrupted: bool
+    tracked: TrackedObject, counts: Counts, watch: Stopwatch, recordings: Sequence[Path], *, interrupted: bool
 ) -> RunSummary:
     """The summary of a run and of one of its objects."""
     reconstruction, collected = tracked.reconstruction, tracked.collected
     rest, camera = reconstruction.rest, reconstruction.camera
     online = tracked.score(tracked.online)
-    several = recordings[0] is not None and len(recordings) > 1
+    several = len(recordings) > 1
     return RunSummary(
         source=tracked.config.source,
         frames=counts.frames,
@@ -165,7 +165,7 @@ def summary_of(
         frames_lost=counts.frames_lost,
         fps=counts.frames / watch.elapsed_s,
         stage_ms={stage: total / max(counts.frames, 1) for stage, total in watch.total.items()},
-        recording=recordings[0],
+        recording=recordings[0] if recordings else None,
         parts=len(recordings) if several else None,
         last_part=recordings[-1] if several else None,
     )

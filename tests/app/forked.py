@@ -9,7 +9,7 @@ import socket
 import subprocess
 import sys
 from contextlib import suppress
-from functools import cache
+from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
 
@@ -23,14 +23,18 @@ class Forked:
 
     def __init__(self, lifeline: int) -> None:
         self._lifeline = lifeline
-        self._pid = int(os.read(lifeline, 16))
+
+    @cached_property
+    def _pid(self) -> int:
+        return int(os.read(self._lifeline, 16))
 
     def kill(self) -> None:
         with suppress(ProcessLookupError):
             os.kill(self._pid, signal.SIGKILL)
 
     def wait(self) -> None:
-        os.read(self._lifeline, 1)
+        while os.read(self._lifeline, 16):
+            pass
         os.close(self._lifeline)
 
 

@@ -63,7 +63,7 @@ def test_a_recording_is_enough(tmp_path: Path, sheet: Path, ending: str) -> None
     assert not list(tmp_path.glob("*.part*"))
 
 
-def test_a_video_is_painted_while_it_is_tracked(tmp_path: Path, videos: Path, texture: Path) -> None:
+def test_a_video_is_painted_as_its_recording_is(tmp_path: Path, videos: Path, texture: Path) -> None:
     out, rrd = tmp_path / "live.mp4", tmp_path / "live.rrd"
     run = command(videos / "turning.mp4", texture, out, points=120, rrd=rrd)
     painted = retexture(run, Progress())
@@ -75,7 +75,7 @@ def test_a_video_is_painted_while_it_is_tracked(tmp_path: Path, videos: Path, te
     assert np.mean([np.abs(a.astype(int) - b).mean() for a, b in zip(live, frames_of(again), strict=True)]) < 3
 
 
-def test_without_its_name_a_live_run_leaves_no_recording(here: Path, videos: Path, texture: Path) -> None:
+def test_without_its_name_no_recording_is_left(here: Path, videos: Path, texture: Path) -> None:
     retexture(command(videos / "turning.mp4", texture, here / "live.mp4", points=120, frames=":12"), Progress())
     assert [path.name for path in here.iterdir()] == ["live.mp4"]
 
