@@ -1,0 +1,42 @@
+"""Things that are hard: solids that turn late, sheets that are never flat, among gross errors and gaps."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.options.evaluate import Evaluate
+from app.pipeline.evaluate import Evaluation, evaluate
+from app.synthetic.scene import scene
+from app.synthetic.tracks import SEVERE, USUAL, Damage, damaged, tracks
+from app.terminal.progress import Progress
+from tracking.tracks import Tracks
+
+pytestmark = pytest.mark.slow
+
+
+def evaluated(given: Tracks, folder: Path) -> Evaluation:
+    path = folder / "tracks.npz"
+    with path.open("wb") as file:
+        given.save(file)
+    return evaluate(Evaluate(path), Progress())
+
+
+@pytest.mark.parametrize(
+    ("kind", "damage", "found", "bound"),
+    [("box-late", USUAL, "rigid", 0.004), ("head", SEVERE, "rigid", 0.01), ("rolling", SEVERE, "isometric", 0.035)],
+    ids=["box-late", "head-damaged", "rolling-damaged"],
+)
+def test_made_up_things(tmp_path: Path, kind: str, damage: Damage, found: str, bound: float) -> None:
+    outcome = evaluated(tracks(scene(kind, 1), damage), tmp_path)
+    assert outcome.rest_shape == found
+    assert outcome.score is not None
+    assert outcome.score.e3d <= bound
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_waving_sheet_with_gaps_noise_and_gross_errors(shared_data: Path, tmp_path: Path, seed: int) -> None:
+    outcome = evaluated(damaged(Tracks.load(shared_data / "waving_5.npz"), SEVERE, np.random.default_rng(seed)), tmp_path)
+    assert outcome.rest_shape == "isometric"
+    assert outcome.score is not None
+    assert outcome.score.e3d <= 0.0285  # 0.015 without any of it
