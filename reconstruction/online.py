@@ -130,7 +130,7 @@ class Reconstruction:
         Raises:
             ReconstructionError: no rest shape can be had from the frames so far.
         """
-        if self.settings.modes >= W.shape[1]:
+        if self.settings.modes != "auto" and self.settings.modes >= W.shape[1]:
             problem = f"modes {self.settings.modes} does not fit {W.shape[1]} points: choose fewer"
             raise ReconstructionError(problem, "modes")
         self._waiting.append(Waiting(W, visible, self._restart))
@@ -207,7 +207,8 @@ class Reconstruction:
         sheet = rest.flat or rest.kind == "isometric"
         self.deformation = constraints.fitting(self.settings.deformation, flat=sheet)
         self.metric = distances.fitting(self.settings.metric, flat=sheet)
-        model = build_model(rest, self.camera, self.settings.modes, self.metric, self._mesh)
+        modes = min(found.modes, rest.motion.shape.shape[1] - 1) if self.settings.modes == "auto" else self.settings.modes
+        model = build_model(rest, self.camera, modes, self.metric, self._mesh)
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
         refine = self.settings.refine_rest and not paper and rest.kind != "isometric"

@@ -10,6 +10,7 @@ Metric = Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen
 MetricChoice = Literal["auto", Metric]
 Deformation = Literal["auto", "bending", "stretching", "general", "inextensible"]
 RecoveredRestShape = Literal["auto", "rigid", "plane"]
+USUAL_MODES = 20
 PriorName = Literal["rest", "smoothness", "rotation", "scale", "inextensibility"]
 
 
@@ -29,8 +30,8 @@ class Settings:
     """Distance between points that the modes come from: straight, along the mesh's edges, in units of the extent along
     each axis, chi-squared of the coordinates, or Jensen-Shannon of the nearness to landmarks. Auto: Jensen-Shannon for a
     solid rest shape, chi-squared for a flat one."""
-    modes: int = 20
-    """Number of modes r."""
+    modes: Literal["auto"] | int = "auto"
+    """Number of modes r. Auto: 20; 40 for a solid whose keyframes show that it deforms."""
     deformation: Deformation = "auto"
     """How the surface may deform: bend out of its plane, drawing in as a sheet does; in its plane; freely; freely, but
     nearly keeping its lengths. Auto: general for a solid rest shape, inextensible for a flat one."""
@@ -59,7 +60,7 @@ class Settings:
         if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:
             problem = f"bootstrap_frames {self.bootstrap_frames} is too few: give auto, or 2 and more"
             raise ReconstructionError(problem, "bootstrap_frames")
-        if self.modes < 1:
+        if self.modes != "auto" and self.modes < 1:
             raise ReconstructionError(f"modes {self.modes} is too few: give 1 and more", "modes")
         if self.window < 1:
             raise ReconstructionError(f"window {self.window} is too short: give 1 and more", "window")

@@ -97,7 +97,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
         tracks=str(config.tracks),
         frames=frames,
         points=points,
-        modes=config.model.modes,
+        modes=len(reconstruction.model.basis.eigenvalues),
         rest_shape=rest.kind,
         rest_shape_note=rest.note,
         focal_px=camera.focal_px if camera.perspective else None,

@@ -15,7 +15,9 @@ from reconstruction.mapping.isometric.focal import focal, with_focal
 from reconstruction.mapping.isometric.halves import Halves
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, select
+from reconstruction.mapping.solid.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
+from reconstruction.settings import USUAL_MODES
 from reconstruction.state import State
 
 FEWEST_KEYFRAMES = 6
@@ -34,6 +36,7 @@ class Map:
         camera: with the focal length that the keyframes hold, else as given.
         sheet: its depths and lengths, if it is a sheet.
         unit_px: pixels of the first keyframe in a unit of the sheet.
+        modes: how many it is worth.
         focal_note: how the focal length was found, in words; empty if it was not looked for.
     """
 
@@ -41,6 +44,7 @@ class Map:
     camera: Camera
     sheet: IsometricSheet | None = None
     unit_px: float = 1.0
+    modes: int = USUAL_MODES
     focal_note: str = ""
 
     def expected(self, model: Model, W: Array, visible: Mask, last: State | None) -> State | None:
@@ -129,7 +133,7 @@ def solid_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, es
     if estimate_focal and np.nanmedian(found.residual_px) > RIGID * rms_radius(found.shape):
         found = bundle_adjust(W, visible, camera, refine_focal=False)
     rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
-    return Map(rest, found.camera)
+    return Map(rest, found.camera, modes=modes_held(W, visible, found, camera))
 
 
 def sheet_map(camera: Camera, found: IsometricSheet, evidence: Evidence, *, estimate_focal: bool) -> Map:

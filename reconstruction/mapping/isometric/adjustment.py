@@ -36,6 +36,7 @@ FIRM_START = 100.0  # times the bending weight, before it is let go
 DOUBTFUL = 3.0  # times the usual change of length
 LITTLE_CHANGE = 0.003  # usual change of length, with which a start is good
 PART_LEFT_OUT = 0.4  # of the points
+DEEPEST = 1.0  # logarithm of a depth over the usual one, beyond which it says nothing: far from all points seen
 SOLVER = Solver()
 
 
@@ -69,7 +70,9 @@ def sheet(
     if start is None:
         c = first_depths(nodes, seen, values[nodes.points], field.stiffness, camera)
     else:
-        c = coefficients_of(start.log_depths[:, nodes.points], values[nodes.points], field.stiffness)
+        known = start.log_depths[:, nodes.points]
+        far = np.abs(known - np.nanmedian(known, axis=1, keepdims=True)) > DEEPEST
+        c = coefficients_of(np.where(far, np.nan, known), values[nodes.points], field.stiffness)
     factor = np.ones(len(nodes.ends))
     for _ in range(rounds):
         c, factor = again(nodes, seen, seen.weighted(factor), c, field.stiffness)
@@ -91,13 +94,12 @@ def first_depths(nodes: Nodes, seen: Edges, B: Array, stiffness: Array, camera: 
     c, least = np.zeros((0, 0)), np.inf
     for part in parts_of(nodes.reference):
         inside = start.weighted(np.asarray(part[nodes.ends].all(axis=1), np.float64))
-        with np.errstate(over="ignore", invalid="ignore"):  # far from a part its depths may be anything
-            tried = convex_start(nodes, part, start, B, stiffness, camera)
-            tried = adjust_depths(inside, tried, stiffness, Solver(bend=FIRM_START * SOLVER.bend))
-            tried = adjust_depths(inside, tried, stiffness, SOLVER)
-            tried = tried if part.all() else once_more(start, start, tried, stiffness)[0]
-            g = start.log_lengths(tried)
-            change = usual(g - mean_log_lengths(start, g))
+        tried = convex_start(nodes, part, start, B, stiffness, camera)
+        tried = adjust_depths(inside, tried, stiffness, Solver(bend=FIRM_START * SOLVER.bend))
+        tried = adjust_depths(inside, tried, stiffness, SOLVER)
+        tried = tried if part.all() else once_more(start, start, tried, stiffness)[0]
+        g = start.log_lengths(tried)
+        change = usual(g - mean_log_lengths(start, g))
         if not len(c) or change < least:
             c, least = tried, change
         if least < LITTLE_CHANGE:
@@ -144,8 +146,14 @@ def coefficients_of(log_depths: Array, B: Array, stiffness: Array) -> Array:
 
 
 def again(nodes: Nodes, seen: Edges, edges: Edges, c: Array, stiffness: Array) -> tuple[Array, Array]:
-    """As `once_more`, frames that fell into another minimum started from others that did not, too."""
+    """As `once_more`, frames that fell into another minimum started from others that did not, too.
+
+    Raises:
+        ReconstructionError: there are no such depths.
+    """
     off = robust_lengths(edges, edges.log_lengths(c))[1]
+    if not np.isfinite(off).all():
+        raise ReconstructionError("no depths along the rays keep the lengths")
     good = np.flatnonzero(off <= np.median(off))
     alike = good[nearest(nodes.images, nodes.images[good])]
     starts = [np.tile(c[good].mean(axis=0), (len(c), 1))]

@@ -7,6 +7,7 @@ import scipy.linalg
 
 from reconstruction.arrays import Array, Indices
 
+FARTHEST = 50.0  # logarithm of a depth, so that squares stay numbers
 HOPELESS = 1e4  # damping with which no step helps
 ENOUGH = 1e-3  # relative decrease of a frame's cost that is not worth another step
 TOGETHER = 8  # frames are worked on at once, whatever start they come from; more would not stay near the processor
@@ -44,7 +45,7 @@ class Edges:
 
         Both are (F, n).
         """
-        mi, mj = np.exp(c @ self.B[0].T), np.exp(c @ self.B[1].T)
+        mi, mj = (np.exp(np.clip(c @ B.T, -FARTHEST, FARTHEST)) for B in self.B)
         cross = mi * mj * self.products
         ii = mi**2 * self.squares[:, 0] - cross
         L = np.maximum(ii + mj**2 * self.squares[:, 1] - cross, 1e-300)

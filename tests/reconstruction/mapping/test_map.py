@@ -110,3 +110,11 @@ def test_unknown_points_are_where_their_neighbours_are() -> None:
     assert np.isfinite(whole).all()
     np.testing.assert_array_equal(whole[:, [0, 1, 3, 4]], shape[:, [0, 1, 3, 4]])
     assert completed(whole, like) is whole
+
+
+@pytest.mark.parametrize("step_px", [2.0, 40.0])
+def test_points_that_belong_to_nothing_break_nothing(step_px: float) -> None:
+    rng = np.random.default_rng(1)
+    W = 250 + 60 * rng.standard_normal((1, 2, 60)) + np.cumsum(step_px * rng.standard_normal((14, 2, 60)), axis=0)
+    found = map_of(W, np.ones((14, 60), bool), PERSPECTIVE, estimate_focal=True)
+    assert found is None or np.isfinite(found.rest.motion.shape).all()

@@ -1,0 +1,50 @@
+"""How many modes a solid needs: more than usual if those predict points of the keyframes that they are not fitted to."""
+
+import numpy as np
+
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis.mesh import triangulate
+from reconstruction.basis.modes import modal_basis, principal_axes
+from reconstruction.camera import Camera
+from reconstruction.mapping.solid.bundle import Bundle
+from reconstruction.mapping.solid.solid import Solid
+from reconstruction.settings import USUAL_MODES
+
+MORE_MODES = 40
+COMPARED = 0.8  # of the points: no more modes can be compared
+BETTER = 0.97  # times what the usual modes leave over: less than that is worth the time
+
+
+def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera) -> int:
+    """Number of modes for a solid.
+
+    What its rigid shape leaves over in each keyframe is fitted by the modes; by generalised cross validation, more of them
+    always explain more, but only where there is a deformation do they predict more. Medians, against gross errors.
+
+    Args:
+        W: (K, 2, p) px; anything where not visible.
+        visible: (K, p).
+        solid: the rigid shape posed in the keyframes.
+        camera: as it was made for.
+    """
+    p = W.shape[2]
+    more = min(MORE_MODES, int(COMPARED * p))
+    if more <= USUAL_MODES:
+        return USUAL_MODES
+    shape = solid.shape
+    modes = modal_basis(shape, triangulate((principal_axes(shape).T @ shape)[:2].T), more, "jensen-shannon").Upsilon
+    functions = np.concatenate([np.full((1, p), p**-0.5), modes])
+    left = W - camera.center_px[:, None] - Bundle(solid.motion, 1 / solid.camera.focal_px).image()
+    usual, most = (left_over(left, visible, functions[: count + 1]) for count in (USUAL_MODES, more))
+    return MORE_MODES if most < BETTER * usual else USUAL_MODES
+
+
+def left_over(residuals: Array, visible: Mask, functions: Array) -> float:
+    """Usual length of residuals (K, 2, p) off functions (n, p) fitted to them, over the share of freedom that is left."""
+    lengths, free = [], []
+    for off, seen in zip(residuals, visible, strict=True):
+        if seen.sum() > len(functions):
+            basis = np.linalg.qr(functions[:, seen].T)[0]
+            lengths.append(np.linalg.norm(off[:, seen] - (off[:, seen] @ basis) @ basis.T, axis=0))
+            free.append(1 - len(functions) / seen.sum())
+    return float(np.median(np.concatenate(lengths)) / np.mean(free)) if lengths else np.inf

@@ -1,0 +1,36 @@
+"""How many modes a solid is worth: few if it is rigid, more if it deforms here and there."""
+
+import numpy as np
+import pytest
+
+from reconstruction.mapping.solid.freedom import MORE_MODES, modes_held
+from reconstruction.mapping.solid.solid import bundle_adjust
+from reconstruction.settings import USUAL_MODES
+from tests.reconstruction.world import PERSPECTIVE, relief, seen, turns
+
+K, P = 20, 120
+
+
+@pytest.mark.parametrize("deforms", [False, True])
+def test_as_many_modes_as_the_keyframes_show(deforms: bool) -> None:
+    rng = np.random.default_rng(2)
+    shapes = np.repeat(relief(rng, P)[None], K, axis=0)
+    if deforms:  # small bumps anywhere, each for itself
+        width = np.ptp(shapes[0, 0])
+        for centre in shapes[0, :2, rng.choice(P, 12)]:
+            bump = np.exp(-((shapes[0, :2] - centre[:, None]) ** 2).sum(axis=0) / (0.12 * width) ** 2)
+            shapes = shapes + 0.03 * width * rng.normal(size=(K, 3, 1)) * bump
+    W, _ = seen(shapes, turns(K), PERSPECTIVE)
+    W = W + 0.2 * rng.normal(size=W.shape)
+    visible = rng.random((K, P)) > 0.1
+    solid = bundle_adjust(W, visible, PERSPECTIVE, refine_focal=False)
+    assert modes_held(np.where(visible[:, None], W, np.nan), visible, solid, PERSPECTIVE) == (
+        MORE_MODES if deforms else USUAL_MODES
+    )
+
+
+def test_few_points_have_few_modes() -> None:
+    rng = np.random.default_rng(3)
+    W, _ = seen(np.repeat(relief(rng, 20)[None], K, axis=0), turns(K), PERSPECTIVE)
+    solid = bundle_adjust(W, np.ones((K, 20), bool), PERSPECTIVE, refine_focal=False)
+    assert modes_held(W, np.ones((K, 20), bool), solid, PERSPECTIVE) == USUAL_MODES
