@@ -73,6 +73,17 @@ def test_real_data_give_every_table(shared_data: Path, tmp_path: Path) -> None:
     assert [len(row) for row in experiments["mode-counts"]["tables"][0]["rows"]] == [5] * 8
 
 
+@pytest.mark.slow
+def test_hard_cases_are_taken_for_what_they_are(tmp_path: Path) -> None:
+    reproduced = reproduce(Reproduce(tmp_path, tmp_path / "out", only=("hard-cases",), quick=True), Progress())
+    [table] = reproduced.experiments["hard-cases"]["tables"]
+    sheet, solid = (dict(zip(table["columns"], row, strict=True)) for row in table["rows"])
+    assert (sheet["what"], sheet["taken for"]) == ("waving-5", "sheet")
+    assert (solid["what"], solid["taken for"]) == ("box-late", "solid")
+    assert sheet["at the end"] < 1.1
+    assert solid["at the end"] < 0.4 < 2 < solid["on the way"]
+
+
 def test_real_data_stand_beside_peers(shared_data: Path, tmp_path: Path) -> None:
     reproduced = reproduce(Reproduce(shared_data, tmp_path / "out", only=("peers", "mode-shapes"), quick=True), Progress())
     experiments = reproduced.experiments
