@@ -23,6 +23,7 @@ from tests.robustness.degraded import (
 KINECT_ROI = (195, 95, 325, 265)
 
 
+@pytest.mark.slow
 def test_a_cut_is_noticed_and_the_sheet_found_again(shared_data: Path, tmp_path: Path) -> None:
     result = run(shared_data / "kinect_paper.mp4", shared_data / "kinect_paper_gt.npz", KINECT_ROI, tmp_path)
     assert result.words["losses"] == result.words["recoveries"] == 1

@@ -40,7 +40,7 @@ def test_file_that_is_cut_off(tmp_path: Path, long_recording: Path) -> None:
     assert path.read_bytes() == before
 
 
-@settings(max_examples=25)
+@settings(max_examples=12)
 @given(share=st.floats(0.0, 0.999))
 def test_cut_anywhere_it_is_read_or_refused(
     tmp_path_factory: pytest.TempPathFactory, long_recording: Path, share: float
