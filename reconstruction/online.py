@@ -71,6 +71,7 @@ class Reconstruction:
         if settings.energy == "paper" and camera.perspective:
             raise ReconstructionError("energy paper needs an orthographic camera", "energy")
         self.camera, self.settings = camera, settings
+        self._assumed = camera  # first frames may mislead: maps find the focal length by themselves
         self.map: Map | None = None
         self._given = given
         self._mapper = (mapper or Mapper(settings)) if given is None else None
@@ -136,7 +137,7 @@ class Reconstruction:
         self._waiting.append(Waiting(W, visible, self._restart))
         self._restart = False
         oldest = self._waiting[0]
-        found = self._mapper.add(W, visible, self.camera, (oldest.W, oldest.visible)) if self._mapper else None
+        found = self._mapper.add(W, visible, self._assumed, (oldest.W, oldest.visible)) if self._mapper else None
         if self._given is not None and self.map is None:
             found = Map(scaled_to(self._given, W, visible), self.camera)
         if found is not None:
@@ -159,7 +160,7 @@ class Reconstruction:
             ReconstructionError: no rest shape can be had from them.
         """
         if self.window is None and self._mapper:
-            found = self._mapper.finish(self.camera)
+            found = self._mapper.finish(self._assumed)
             if found is not None:
                 self._adopt(found)
         return self.catch_up()
@@ -169,7 +170,7 @@ class Reconstruction:
 
         Then all frames are worth another pass: the next one to `update` is the first again.
         """
-        found = self._mapper.final(self.camera) if self._mapper and self.window else None
+        found = self._mapper.final(self._assumed) if self._mapper and self.window else None
         if found is None:
             return False
         self._mapper = self._last = None
