@@ -46,7 +46,15 @@ def picture() -> NDArray[np.uint8]:
     return image
 
 
-def write_run(path: Path, *, frames: int = 6, first_shape: int = 2, camera: Camera | None = None, **options: object) -> Run:
+def write_run(
+    path: Path,
+    *,
+    frames: int = 6,
+    first_shape: int = 2,
+    camera: Camera | None = None,
+    unsure: bool = True,
+    **options: object,
+) -> Run:
     """Write `frames` frames; every third point is hidden in odd frames, and shapes are known from `first_shape` on.
 
     As in a real run, the frames before it get their shapes when the rest shape is known.
@@ -72,7 +80,7 @@ def write_run(path: Path, *, frames: int = 6, first_shape: int = 2, camera: Came
         residual = np.where(visible, np.sqrt(0.5), np.nan)
         observations.append(Observation(observed, visible))
         pose = q, R, origin[:2], 1.0
-        sigma = np.linspace(0.0, 8.0, len(pixels)) + index
+        sigma = np.linspace(0.0, 8.0, len(pixels)) + index if unsure else None
         estimates.append(ShapeEstimate(index, *pose, Lambda, shape, projection, residual, visible, sigma=sigma))
     run = Run(path, image, pixels, camera, mesh, basis, observations, estimates)
     configuration: Mapping[str, object] = {"source": "sheet.mp4", "modes": MODES}

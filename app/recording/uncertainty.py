@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from app.arrays import Array
 from reconstruction.basis.rest_shape import rms_radius
 
-UNSURE = 0.1  # standard deviation over the shape's RMS radius at which a vertex is red; a sure one is white
+UNSURE = 0.05  # standard deviation over the shape's RMS radius at which a vertex is red; a sure one is white
 
 
 def colors(sigma: Array | None, shape: Array) -> NDArray[np.uint8] | None:

@@ -18,7 +18,7 @@ FRAMES = 40
 
 @pytest.fixture(scope="module")
 def run(viewer: Viewer, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    run = write_run(tmp_path_factory.mktemp("viewer") / "sheet.rrd", frames=FRAMES)
+    run = write_run(tmp_path_factory.mktemp("viewer") / "sheet.rrd", frames=FRAMES, unsure=False)
     viewer.client.open(str(run.path))
     end = time.monotonic() + SETTLE_S
     while viewer.client.get_state().loading and time.monotonic() < end:
