@@ -11,8 +11,6 @@ from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest
 from reconstruction.mapping.isometric.smooth_field import SmoothField
 from reconstruction.mapping.isometric.warps import Warps
 
-BROKEN = 0.3  # weight of an edge that does not keep its length
-
 
 @dataclass(frozen=True)
 class IsometricSheet:
@@ -74,13 +72,3 @@ class IsometricSheet:
         c = best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, steps)
         off = edges.log_lengths(c) - self.log_lengths
         return replace(self, warps=warps, nodes=nodes, coefficients=c, strain=edges.rms(off), change=usual(off))
-
-    def strays(self) -> Mask:
-        """Points (p,) that are not on the sheet: nearest to a node most of whose edges do not keep their length."""
-        count = np.bincount(self.nodes.ends.ravel(), minlength=self.nodes.reference.shape[1])
-        broken = np.bincount(self.nodes.ends[self.edge_weights < BROKEN].ravel(), minlength=len(count))
-        stray = np.zeros(self.warps.reference.shape[1], bool)
-        kept = self.warps.placed
-        apart = np.linalg.norm(self.warps.reference[:, kept, None] - self.nodes.reference[:, None], axis=0)
-        stray[kept] = (2 * broken > count)[apart.argmin(axis=1)]
-        return stray

@@ -73,11 +73,6 @@ class Warps:
         """Smooth images of more frames W (F, 2, p) px."""
         return fitted(self, W, visible, self.firmness)
 
-    def frames(self, chosen: Array | Indices) -> "Warps":
-        """Some of the images."""
-        picked = {name: getattr(self, name)[chosen] for name in ("coefficients", "weights", "inlier", "noise_px")}
-        return replace(self, **picked)
-
 
 def smooth_warps(W: Array, visible: Mask) -> Warps:
     """Smooth images of W (F, 2, p) px, by visibility (F, p)."""
