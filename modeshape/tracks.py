@@ -20,8 +20,8 @@ class Reconstruction:
 
     Args:
         size: (width, height) of the picture, px.
-        focal_px: focal length; infinite for an orthographic camera; None: found from the first frames, as far
-            as they hold it, else the width.
+        focal_px: focal length; infinite for an orthographic camera; None: found where the views hold it,
+            else the width.
         settings: how to reconstruct.
 
     Raises:

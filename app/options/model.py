@@ -49,8 +49,8 @@ class Model(Settings):
     estimate_focal: tyro.conf.Suppress[bool] = False
     priors: Annotated[Mapping[str, float], PRIORS] = field(default_factory=dict, hash=False)
     focal: float | Literal["auto"] | None = None
-    """Focal length in pixels; auto: from the first frames where they hold it, as a run has it without this option, else the
-    picture's width. Without it, evaluate takes that of the file."""
+    """Focal length in pixels; auto: found where the views hold it, as a run has it without this option, else the picture's
+    width. Without it, evaluate takes that of the file."""
 
     def __post_init__(self) -> None:
         try:

@@ -17,11 +17,10 @@ from reconstruction.mapping.evidence import (
     judging_points,
 )
 from reconstruction.mapping.factorization import affine_structure, factorize, view_turn_degrees
-from reconstruction.mapping.rigid import bundle_adjust, poses_over_time
-from reconstruction.mapping.sheet import best_tilted, sheet
-from reconstruction.window.ambiguity import TILT_GAIN
+from reconstruction.mapping.rigid import bundle_adjust
+from reconstruction.mapping.solid import solid
 
-SHARP = 2.0  # times worse that a clearly other tilt fits, where the tilt shows even in a smaller turn
+VIEWS = 16  # of the first frames are enough for a plane
 BENT = 0.012  # reprojection error over the image's extent, above which a sheet is not flat in all frames
 FEWEST_FLAT = 10  # frames that tell a tilt
 FAR = 3.0  # times the median distance from the middle, beyond which a point's depth is not believed
@@ -81,34 +80,44 @@ def factorize_often_seen(W: Array, visible: Mask) -> RigidMotion:
 
 
 def plane(W: Array, visible: Mask, camera: Camera) -> RestShape:
-    """A flat sheet: tilted as the first frames say, frontal where they do not say.
+    """A flat sheet, tilted as the first frames say: as many of them as one plane explains.
 
     Raises:
         ReconstructionError: fewer than 4 points visible in a frame.
     """
     if visible.sum(axis=1).min() < 4:
         raise ReconstructionError("cannot recover a rest shape: fewer than 4 points are visible")
-    first = first_image(W, visible)
-    frontal = sheet(first, np.eye(3), camera)
-    chosen = judging_points(W, visible)
-    if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL or len(W) < 3:
-        return RestShape("plane", frontal, "flat sheet facing the camera: the first frames show no turn")
-    frames = np.unique(np.linspace(0, len(W) - 1, 16).astype(int))
-    W_few, visible_few = W[frames][:, :, chosen], visible[frames][:, chosen]
-    (ahead,) = poses_over_time(W_few, visible_few, [sheet(first[:, chosen], np.eye(3), camera)], camera)
-    level = bundle_adjust(W_few, visible_few, ahead, camera, sweeps=1)
-    start, sharpness = best_tilted(first[:, chosen], W_few, visible_few, camera)
-    tilted = bundle_adjust(W_few, visible_few, start, camera, flat=True, sweeps=15)
-    turn = view_turn_degrees(tilted[0].R)
-    if tilted[1] > TILT_GAIN * level[1] or (turn < TURN_DEGREES and sharpness < SHARP):
-        if tilted[1] > BENT * extent(first) and len(W) >= 2 * FEWEST_FLAT:  # it bends meanwhile: judge by the frames before
-            return plane(W[: len(W) // 2], visible[: len(W) // 2], camera)
-        note = f"flat sheet facing the camera: its tilt does not show in {len(W)} frames"
-        return RestShape("plane", frontal, note)
-    whole = sheet(first, tilted[0].R[0], camera)
-    tilt = np.rad2deg(np.arccos(np.clip(abs(whole.R[0, 2, 2]), 0, 1)))
-    note = f"flat sheet tilted {tilt:.0f}° in the first frame, turned {turn:.0f}°, reprojection error {tilted[1]:.2f} px"
-    return RestShape("plane", whole.in_first_frame(), note)
+    first, chosen = first_image(W, visible), judging_points(W, visible)
+    count = len(W)
+    if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL or count < FEWEST_FLAT:
+        return RestShape("plane", tilted_sheet(first, np.eye(3), camera), "flat sheet facing the camera: nothing turns yet")
+    while True:
+        frames = np.unique(np.linspace(0, count - 1, VIEWS).astype(int))
+        views = np.where(visible[frames][:, None], W[frames], np.nan)[:, :, chosen]
+        found = solid.bundle_adjust(views, visible[frames][:, chosen], camera, refine_focal=False, flat=True)
+        left = float(np.nanmedian(found.residual_px))
+        if left <= BENT * extent(first) or count < 2 * FEWEST_FLAT:  # else it bends meanwhile: by the frames before
+            break
+        count //= 2
+    U = np.linalg.svd(found.shape, full_matrices=False)[0]  # its plane in the first frame
+    R = U if np.linalg.det(U) > 0 else U * [1, 1, -1]
+    motion = tilted_sheet(first, R, camera)
+    tilt = np.rad2deg(np.arccos(np.clip(abs(R[2, 2]), 0, 1)))
+    note = f"flat sheet tilted {tilt:.0f}° in the first frame, by {count} frames, median residual {left:.2f} px"
+    return RestShape("plane", motion.in_first_frame(), note)
+
+
+def tilted_sheet(image: Array, R: Array, camera: Camera) -> RigidMotion:
+    """The flat sheet in the plane turned by R (3, 3) that looks like the image (2, p) px."""
+    W = image - camera.center_px[:, None]
+    t = W.mean(axis=1)
+    rows = R[:2, :2, None] - (W / camera.focal_px)[:, None] * R[2, :2, None]  # (2, 2, p)
+    xy = np.linalg.solve(rows.transpose(2, 0, 1), (W - t[:, None]).T[:, :, None])[:, :, 0].T
+    shape = np.concatenate([xy, np.zeros((1, W.shape[1]))])
+    centre = shape.mean(axis=1)
+    away = R @ centre
+    depth = 1 + away[2] / camera.focal_px
+    return RigidMotion(shape - centre[:, None], R[None], np.array([1 / depth]), ((t + away[:2]) / depth)[None])
 
 
 def first_image(W: Array, visible: Mask) -> Array:

@@ -21,7 +21,6 @@ def bundle_adjust(
     motion: RigidMotion,
     camera: Camera,
     *,
-    flat: bool = False,
     sweeps: int = 30,
 ) -> tuple[RigidMotion, float]:
     """Improve shape and poses over observations (F, 2, p) px with visibility (F, p).
@@ -31,7 +30,6 @@ def bundle_adjust(
         visible: (F, p).
         motion: where to start.
         camera: the camera.
-        flat: keep the shape in its plane z = 0.
         sweeps: most turns of poses and points.
 
     Returns:
@@ -45,7 +43,7 @@ def bundle_adjust(
         if value > previous * (1 - 1e-3):
             break
         previous = value
-        motion = replace(motion, shape=solve_points(W, h, motion, camera, flat=flat))
+        motion = replace(motion, shape=solve_points(W, h, motion, camera))
     return motion, reprojection_rms(W, h, motion, camera)
 
 
@@ -59,25 +57,6 @@ def adjust_poses(W: Array, h: Array, motion: RigidMotion, camera: Camera, energy
     return motion, float(found.value.sum())
 
 
-def poses_over_time(W: Array, visible: Mask, starts: list[RigidMotion], camera: Camera) -> list[RigidMotion]:
-    """Poses of observations (F, 2, p) px, frame after frame, of each of several shapes, from its pose before the first."""
-    h = visible.astype(np.float64)
-    W = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None]
-    energy = replace(pose_energy(camera), rotation=0.0, scale=0.0)  # starts are no neighbours in time
-    radius = np.array([rms_radius(start.shape) for start in starts])
-    q = quaternion_from_rotation(np.concatenate([start.R for start in starts]))
-    t, s = (np.concatenate([getattr(start, name) for start in starts]) for name in ("t", "s"))
-    now, path = State(q, t / radius[:, None], np.log(s), np.zeros((len(starts), 3, 0))), []
-    every = [pose_data(W, h, start.shape, camera) for start in starts]
-    gram, cross, power = (np.stack([getattr(data, name) for data in every], axis=1) for name in ("gram", "cross", "power"))
-    for data in map(Statistics, gram, cross, power):
-        now = minimise(energy, data, now, None, POSES).state
-        path.append(now)
-    R = rotation_from_quaternion(np.stack([state.q for state in path]))
-    s, t = np.exp([state.log_s for state in path]), np.stack([state.t for state in path]) * radius[:, None]
-    return [RigidMotion(start.shape, R[:, k], s[:, k], t[:, k]) for k, start in enumerate(starts)]
-
-
 def pose_data(W: Array, h: Array, shape: Array, camera: Camera) -> Statistics:
     """What points (F, 2, p) relative to the principal point say about the poses of a shape (3, p), in units of its size."""
     radius = rms_radius(shape)
@@ -85,20 +64,15 @@ def pose_data(W: Array, h: Array, shape: Array, camera: Camera) -> Statistics:
     return pose_statistics(basis, W / radius, h, camera.focal_px / radius)
 
 
-def solve_points(W: Array, h: Array, motion: RigidMotion, camera: Camera, *, flat: bool) -> Array:
+def solve_points(W: Array, h: Array, motion: RigidMotion, camera: Camera) -> Array:
     """Shape (3, p), centred, given the poses: one small linear system a point, exact also under perspective."""
     A = motion.s[:, None, None] * motion.R
     rows = A[:, :2, :, None] - (W / camera.focal_px)[:, :, None] * A[:, 2, None, :, None]  # (F, 2, 3, p)
-    if flat:
-        rows = rows[:, :, :2]
     weighted = rows * h[:, None, None]
     gram = np.einsum("fcip,fcjp->pij", weighted, rows, optimize=True)
     right = np.einsum("fcip,fcp->pi", weighted, W - motion.t[:, :, None], optimize=True)
-    k = gram.shape[1]
-    damping = 1e-6 * np.trace(gram, axis1=1, axis2=2).mean() / k * np.eye(k)  # keeps points seen once or twice in place
-    anchor = damping @ motion.shape[:k]
-    points = np.linalg.solve(gram + damping, (right + anchor.T)[:, :, None])[:, :, 0].T
-    shape = np.concatenate([points, np.zeros((3 - k, points.shape[1]))])
+    damping = 1e-6 * np.trace(gram, axis1=1, axis2=2).mean() / 3 * np.eye(3)  # keeps points seen once or twice in place
+    shape = np.linalg.solve(gram + damping, (right + (damping @ motion.shape).T)[:, :, None])[:, :, 0].T
     return shape - shape.mean(axis=1, keepdims=True)
 
 

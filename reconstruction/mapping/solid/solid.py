@@ -99,7 +99,7 @@ def bundle_adjust(W: Array, visible: Mask, camera: Camera, *, refine_focal: bool
     build = Build(W[order] / unit, visible[order].astype(np.float64), first / unit, turn, scale, place, flat)
     starts = (build.run(bulge, kappa, refine=refine_focal) for bulge in ((1, -1) if kappa else (1,)))
     found = sorted(starts, key=lambda one: one[1])
-    if kappa and not flat:
+    if kappa:
         found = sorted([*found, build.reversed(found[0][0], kappa, refine=refine_focal)], key=lambda one: one[1])
     bundle = scaled(found[0][0], unit)
     back = np.argsort(order)

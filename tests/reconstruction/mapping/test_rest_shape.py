@@ -10,7 +10,7 @@ from reconstruction.mapping import rest_shape
 from reconstruction.mapping.evidence import weigh
 from reconstruction.mapping.factorization import view_turn_degrees
 from reconstruction.mapping.rest_shape import first_image
-from reconstruction.mapping.sheet import sheet
+from reconstruction.mapping.rest_shape import tilted_sheet as sheet
 from tests.reconstruction.world import (
     CAMERAS,
     ORTHOGRAPHIC,

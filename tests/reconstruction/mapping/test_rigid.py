@@ -10,7 +10,7 @@ from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.factorization import factorize
 from reconstruction.mapping.rigid import bundle_adjust, reprojection_rms, solve_points
-from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, random_rotation, relief, seen, shape_error, turns
+from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, random_rotation, relief, shape_error, turns
 
 FRAMES, POINTS = 14, 40
 
@@ -47,7 +47,7 @@ def test_points_are_solved_for_exactly_given_the_poses(rng: np.random.Generator,
     h = (rng.random((FRAMES, POINTS)) < 0.7).astype(float)
     start = replace(motion, shape=motion.shape + rng.normal(size=motion.shape.shape))
     known = np.where(h[:, None] > 0, W - camera.center_px[:, None], 0.0)
-    found = solve_points(known, h, start, camera, flat=False)
+    found = solve_points(known, h, start, camera)
     np.testing.assert_allclose(found, motion.shape, atol=0.01)
 
 
@@ -95,15 +95,3 @@ def test_the_mirror_image_looks_the_same_to_an_orthographic_camera(rng: np.rando
     np.testing.assert_allclose((mirrored.R @ mirrored.shape)[:, 2], -(truth.R @ truth.shape)[:, 2], atol=1e-9)
     np.testing.assert_allclose(np.linalg.det(mirrored.R), 1.0)
     np.testing.assert_allclose(mirrored.mirrored().shape, truth.shape)
-
-
-def test_a_flat_shape_stays_flat() -> None:
-    rng = np.random.default_rng(0)
-    shape = np.concatenate([relief(rng, POINTS)[:2], np.zeros((1, POINTS))])
-    W, _ = seen(np.broadcast_to(shape, (FRAMES, 3, POINTS)), turns(FRAMES), PERSPECTIVE)
-    start = RigidMotion(shape + np.array([[3.0], [-2.0], [0.0]]) * rng.normal(size=POINTS), turns(FRAMES),
-                        np.ones(FRAMES), np.zeros((FRAMES, 2)))  # fmt: skip
-    motion, rms = bundle_adjust(W, np.ones((FRAMES, POINTS), bool), start, PERSPECTIVE, flat=True)
-    np.testing.assert_array_equal(motion.shape[2], 0.0)
-    assert rms < 0.2
-    assert shape_error(motion.shape, shape) < 0.02

@@ -1,0 +1,40 @@
+"""The first model, by the first frames alone."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from reconstruction.mapping.bootstrap import bootstrap
+from reconstruction.settings import Settings
+from tests.reconstruction.runs import swelling_hill
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, bending_sheet
+
+
+def test_a_solid_is_known_as_soon_as_it_has_turned() -> None:
+    W, _ = swelling_hill(ORTHOGRAPHIC)
+    visible = np.ones((len(W), W.shape[2]), bool)
+    found = [bootstrap(W[:n], visible[:n], ORTHOGRAPHIC, Settings(), False) for n in (5, 15)]
+    assert found[0] is None
+    assert found[1] is not None
+    assert found[1].rest.kind == "rigid"
+
+
+def test_without_evidence_it_is_a_sheet_and_says_why() -> None:
+    W, _ = bending_sheet()
+    visible = np.ones((len(W), W.shape[2]), bool)
+    assert bootstrap(W[:8], visible[:8], PERSPECTIVE, Settings(), False) is None
+    found = bootstrap(W[:8], visible[:8], PERSPECTIVE, Settings(), True)
+    assert found is not None
+    assert found.rest.kind == "plane"
+    assert "too few frames for a rigid shape" in found.rest.note
+
+
+def test_a_focal_length_that_nobody_gave_is_said_to_be_assumed() -> None:
+    W, _ = bending_sheet()
+    visible = np.ones((len(W), W.shape[2]), bool)
+    for estimate_focal in (True, False):
+        settings = replace(Settings(rest_shape="plane"), estimate_focal=estimate_focal)
+        found = bootstrap(W, visible, PERSPECTIVE, settings, True)
+        assert found is not None
+        assert found.camera.focal_px == PERSPECTIVE.focal_px
+        assert ("assumed" in found.focal_note) is estimate_focal
