@@ -56,8 +56,8 @@ def reconstruct(
         mask: picture of the video's size, white where the surface is in the first frame.
         frames: the first frame, and the one after the last or None.
         points: most points tracked.
-        focal_px: focal length; infinite for an orthographic camera; None: found from the first frames, as far
-            as they hold it, else the width of the picture.
+        focal_px: focal length; infinite for an orthographic camera; None: found where the views hold it,
+            else the width of the picture.
         rest_mesh: file of the rest shape: x, y px of the first frame, z relative depth; without it, from the first frames.
         settings: how to reconstruct.
         recording: file (.rrd) to write what `modeshape run` records.
