@@ -81,7 +81,7 @@ def test_hard_cases_are_taken_for_what_they_are(tmp_path: Path) -> None:
     assert (sheet["what"], sheet["taken for"]) == ("waving-5", "sheet")
     assert (solid["what"], solid["taken for"]) == ("box-late", "solid")
     assert sheet["at the end"] < 1.1
-    assert solid["at the end"] < 0.4 < 2 < solid["on the way"]
+    assert solid["at the end"] < 0.4 < 2 < solid["first frames alone"]
 
 
 def test_real_data_stand_beside_peers(shared_data: Path, tmp_path: Path) -> None:
