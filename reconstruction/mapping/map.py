@@ -108,7 +108,7 @@ def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool) -> Map
             found = sheet_map(camera, surface, evidence, estimate_focal=estimate_focal)
         else:
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal)
-    except ReconstructionError:
+    except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
     if not (estimate_focal and camera.perspective):
         return found

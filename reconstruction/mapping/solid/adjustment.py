@@ -62,9 +62,9 @@ def adjust(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior, how: Ad
 
 
 def energy(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior) -> float:
-    """What `adjust` minimises; infinite with a point too close to the camera."""
+    """What `adjust` minimises; infinite with a point too close to the camera, or a step beyond all numbers."""
     Y = bundle.placed()
-    if bundle.kappa * Y[:, 2].min() < NEAREST - 1:
+    if not np.isfinite(Y).all() or bundle.kappa * Y[:, 2].min() < NEAREST - 1:
         return float("inf")
     return float((h * loss.value(((bundle.image(Y) - W) ** 2).sum(axis=1))).sum()) + prior.value(bundle)
 

@@ -11,6 +11,7 @@ from reconstruction.mapping.outliers import medians
 
 COMPARED = 120  # points: enough to tell views apart
 ROUNDS = 4  # of robust weights
+FEWEST_SHARED = 3  # points
 BESIDE = 7  # views next to the first from which a point's place in it is taken
 
 
@@ -19,8 +20,8 @@ class Likeness:
     """Similarities between all pairs of K views: z_j ≈ a_ij z_i + b_ij, points as complex numbers x + iy.
 
     Attributes:
-        a, b: (K, K) complex.
-        distance: (K, K) what is left, robustly, in units of image j.
+        a, b: (K, K) complex; 1 and NaN for views that share too few points.
+        distance: (K, K) what is left, robustly, in units of image j; of those more than of all others.
     """
 
     a: NDArray[np.complex128]
@@ -45,7 +46,10 @@ def likeness(W: Array, visible: Mask) -> Likeness:
         off = np.abs(cj - a[:, :, None] * ci)
         middle = np.nan_to_num(medians(np.where(both, off, np.nan), axis=2))
         w = both / (1 + (off / (2 * middle + 1e-12)[:, :, None]) ** 2) ** 2
-    return Likeness(a, mean_j - a * mean_i, middle)
+    known = both.sum(axis=2) >= FEWEST_SHARED
+    known &= size > 0
+    b = np.where(known, mean_j - a * mean_i, np.nan)
+    return Likeness(np.where(known, a, 1.0), b, np.where(known, middle, 1e6 * (middle[known].max(initial=0.0) + 1e-300)))
 
 
 def building_order(alike: Likeness) -> tuple[Indices, Indices]:

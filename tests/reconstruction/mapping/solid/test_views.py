@@ -29,3 +29,18 @@ def test_a_path_of_views_is_followed_from_its_middle():
     assert sorted(order) == list(range(7))
     assert order[0] in (2, 3, 4)
     assert (np.abs(order - parent)[1:] == 1).all()
+
+
+def test_views_that_share_nothing_are_built_on_last() -> None:
+    rng = np.random.default_rng(3)
+    W = rng.normal(0, 50, (4, 2, 40))
+    W[1:3] = W[0] + rng.normal(0, 1, (2, 2, 40))
+    visible = np.ones((4, 40), bool)
+    visible[3, :38] = False
+    visible[:3, 38:] = False
+    alike = likeness(W, visible)
+    order, parent = building_order(alike)
+    assert order[-1] == 3
+    assert sorted(order.tolist()) == [0, 1, 2, 3]
+    assert np.isfinite(alike.a).all()
+    assert np.isfinite(completed(W, visible, alike, int(order[0]))).all()
