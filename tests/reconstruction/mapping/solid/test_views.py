@@ -39,7 +39,7 @@ def test_views_that_share_nothing_are_built_on_last() -> None:
     visible[3, :38] = False
     visible[:3, 38:] = False
     alike = likeness(W, visible)
-    order, parent = building_order(alike)
+    order, _ = building_order(alike)
     assert order[-1] == 3
     assert sorted(order.tolist()) == [0, 1, 2, 3]
     assert np.isfinite(alike.a).all()
