@@ -86,7 +86,7 @@ class Map:
         return replace(self, rest=replace(self.rest, motion=motion), unit_px=factor * self.unit_px)
 
 
-def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool) -> Map | None:
+def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool, known: Array | None = None) -> Map | None:
     """What keyframes W (K, 2, p) px with visibility (K, p) show, most different ones first; None where they do not tell.
 
     Args:
@@ -94,6 +94,7 @@ def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool) -> Map
         visible: (K, p).
         camera: its focal length may be a guess, if it is to be estimated.
         estimate_focal: whether the keyframes may change the focal length.
+        known: the rest shape (3, p) so far, of any size.
     """
     if len(W) < FEWEST_KEYFRAMES:
         return None
@@ -107,7 +108,7 @@ def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool) -> Map
             surface = halves.whole() if camera.perspective else sheet(W, visible, seen_by)
             found = sheet_map(camera, surface, evidence, estimate_focal=estimate_focal)
         else:
-            found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal)
+            found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
     if not (estimate_focal and camera.perspective):
@@ -123,15 +124,17 @@ def lens(camera: Camera, W: Array) -> Camera:
     return Camera(LONG_LENS * size, np.nanmean(W, axis=(0, 2)))
 
 
-def solid_map(W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool) -> Map:
+def solid_map(
+    W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool, known: Array | None = None
+) -> Map:
     """The map of a solid; one that deforms holds no focal length.
 
     Raises:
         ReconstructionError: there are too few points.
     """
-    found = bundle_adjust(W, visible, camera, refine_focal=estimate_focal)
+    found = bundle_adjust(W, visible, camera, refine_focal=estimate_focal, known=known)
     if estimate_focal and np.nanmedian(found.residual_px) > RIGID * rms_radius(found.shape):
-        found = bundle_adjust(W, visible, camera, refine_focal=False)
+        found = bundle_adjust(W, visible, camera, refine_focal=False, known=known)
     rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
     return Map(rest, found.camera, modes=modes_held(W, visible, found, camera))
 

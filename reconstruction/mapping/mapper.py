@@ -68,6 +68,7 @@ class Mapper:
         self._map_job: Job | None = None
         self._seen: tuple[Array, Mask, Indices] | None = None  # the keyframes of the last map,
         self._found: Map | None = None  # and what they showed
+        self._known: Array | None = None  # the rest shape of the newest model
         self._version, self._extent = 0, 0.0  # of the keyframes when they were last looked at
 
     def add(self, W: Array, visible: Mask, camera: Camera, begin: tuple[Array, Mask]) -> Map | None:
@@ -113,7 +114,7 @@ class Mapper:
             return None
         if self._seen is None or self._map_job or self._version != self._keyframes.version:
             self._seen = self._keyframes.spread()
-            self._found = map_of(*self._seen[:2], camera, self._settings.estimate_focal) or self._found
+            self._found = map_of(*self._seen[:2], camera, self._settings.estimate_focal, self._known) or self._found
         return self._found and in_order(self._found, np.argsort(self._seen[2]))
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
@@ -131,7 +132,7 @@ class Mapper:
         assert self._first_job is not None
         found, self._first_job = self._first_job.future.result(), None
         if found is not None:
-            self._first = None
+            self._first, self._known = None, found.rest.motion.shape
         return found
 
     def _look_again(self, camera: Camera) -> None:
@@ -141,7 +142,7 @@ class Mapper:
             return
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
             self._seen, self._version, self._extent = keyframes.spread(), keyframes.version, keyframes.extent
-            arguments = *self._seen[:2], camera, self._settings.estimate_focal
+            arguments = *self._seen[:2], camera, self._settings.estimate_focal, self._known
             self._map_job = Job(self._start(map_of, *arguments), self._frame + self._latency)
 
     def _another(self, begin: tuple[Array, Mask]) -> Map | None:
@@ -153,7 +154,7 @@ class Mapper:
         found, self._map_job = self._map_job.future.result(), None
         if found is None:
             return None
-        self._found = found
+        self._found, self._known = found, found.rest.motion.shape
         return nearest_first(found, *self._seen[:2], *begin)
 
     def _ready(self, job: Job | None) -> bool:

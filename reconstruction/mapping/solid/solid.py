@@ -71,7 +71,15 @@ class Solid:
         return np.asarray(np.nanmedian(self.residual_px, axis=1))
 
 
-def bundle_adjust(W: Array, visible: Mask, camera: Camera, *, refine_focal: bool = True, flat: bool = False) -> Solid:
+def bundle_adjust(
+    W: Array,
+    visible: Mask,
+    camera: Camera,
+    *,
+    refine_focal: bool = True,
+    flat: bool = False,
+    known: Array | None = None,
+) -> Solid:
     """The rigid shape that explains keyframes best.
 
     Args:
@@ -80,6 +88,7 @@ def bundle_adjust(W: Array, visible: Mask, camera: Camera, *, refine_focal: bool
         camera: its focal length may be a guess.
         refine_focal: whether the views may change it.
         flat: whether the shape is a plane, whatever the views say.
+        known: a shape (3, p) of any size that it may be, to start from as well.
 
     Raises:
         ReconstructionError: fewer than 3 keyframes, or 6 points seen often enough.
@@ -97,8 +106,9 @@ def bundle_adjust(W: Array, visible: Mask, camera: Camera, *, refine_focal: bool
     kappa = unit / camera.focal_px
     scale = np.abs(alike.a[parent, order])
     build = Build(W[order] / unit, visible[order].astype(np.float64), first / unit, turn, scale, place, flat)
-    starts = (build.run(bulge, kappa, refine=refine_focal) for bulge in ((1, -1) if kappa else (1,)))
-    found = sorted(starts, key=lambda one: one[1])
+    domes = [dome(build.first, FLAT_DOME * bulge if flat else bulge, kappa) for bulge in ((1, -1) if kappa else (1,))]
+    starts = domes if known is None else [*domes, placed_like(build.first, known)]
+    found = sorted((build.run(start, kappa, refine=refine_focal) for start in starts), key=lambda one: one[1])
     if kappa:
         found = sorted([*found, build.reversed(found[0][0], kappa, refine=refine_focal)], key=lambda one: one[1])
     bundle = scaled(found[0][0], unit)
@@ -128,9 +138,9 @@ class Build:
     parent: Indices
     flat: bool
 
-    def run(self, bulge: int, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
-        """From a dome: first the views most alike, then more and more; the bundle and its energy an observation."""
-        bundle = Bundle(dome(self.first, FLAT_DOME * bulge if self.flat else bulge, kappa), kappa)
+    def run(self, start: RigidMotion, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
+        """First the views most alike, then more and more; the bundle and its energy an observation."""
+        bundle = Bundle(start, kappa)
         count, total = 1, len(self.W)
         while count < total:
             more = min(max(FIRST_VIEWS, 2 * count), total)
@@ -221,3 +231,14 @@ def describe(W: Array, visible: Mask, bundle: Bundle, camera: Camera, bulges: tu
     if turn < TURN_DEGREES:
         note += f" (hardly turned: relief beyond {HALF_WIDTH:g} is not believed without proof)"
     return Solid(motion, replace(camera, focal_px=focal), residual, trusted, turn, depth, bulges, note)
+
+
+def placed_like(first: Array, shape: Array) -> RigidMotion:
+    """A shape (3, p) as large and turned as it looks most like the image (2, p)."""
+    t = first.mean(axis=1)
+    shape = shape - shape.mean(axis=1, keepdims=True)
+    affine = (first - t[:, None]) @ np.linalg.pinv(shape)
+    U, size, Vt = np.linalg.svd(affine, full_matrices=False)
+    rows = U @ Vt
+    turned = np.concatenate([rows, np.cross(rows[0], rows[1])[None]]) @ shape
+    return RigidMotion(float(size.mean()) * turned, np.eye(3)[None], np.ones(1), t[None])
