@@ -66,8 +66,8 @@ class Mapper:
         self._looks = FIRST_LOOKS if settings.bootstrap_frames == "auto" else (settings.bootstrap_frames,)
         self._first_job: Job | None = None
         self._map_job: Job | None = None
-        self._seen: tuple[Array, Mask, Indices] | None = None  # the keyframes of the last map,
-        self._found: Map | None = None  # and what they showed
+        self._found: Map | None = None  # the last map
+        self._begin: tuple[Array, Mask] | None = None  # the first frame
         self._known: Array | None = None  # the rest shape of the newest model
         self._version, self._extent = 0, 0.0  # of the keyframes when they were last looked at
 
@@ -84,6 +84,7 @@ class Mapper:
             ReconstructionError: no rest shape can be had from the first frames.
         """
         self._frame += 1
+        self._begin = self._begin or begin
         if self._keyframes is not None:
             self._keyframes.offer(self._frame, W, visible)
         if self._first is not None:
@@ -109,13 +110,13 @@ class Mapper:
         return begun or bootstrap(W, visible, camera, self._settings, last=True)
 
     def final(self, camera: Camera) -> Map | None:
-        """The map of the keyframes of all frames, posed in the first of them first; None if they do not tell."""
+        """The map of the keyframes of all frames, posed first as in the first frame; None if they do not tell."""
         if self._keyframes is None:
             return None
-        if self._seen is None or self._map_job or self._version != self._keyframes.version:
-            self._seen = self._keyframes.spread()
-            self._found = map_of(*self._seen[:2], camera, self._settings.estimate_focal, self._known) or self._found
-        return self._found and in_order(self._found, np.argsort(self._seen[2]))
+        if self._found is None or self._map_job or self._version != self._keyframes.version:
+            W, visible, _ = self._keyframes.spread()
+            self._found = map_of(W, visible, camera, self._settings.estimate_focal, self._known) or self._found
+        return self._found and self._begin and nearest_first(self._found, *self._begin)
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
         """Begin a first model, if it is time."""
@@ -141,8 +142,8 @@ class Mapper:
         if keyframes is None or self._map_job or self._frame + 1 < self._looks[-1] or len(keyframes.frames) < FEWEST:
             return
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
-            self._seen, self._version, self._extent = keyframes.spread(), keyframes.version, keyframes.extent
-            arguments = *self._seen[:2], camera, self._settings.estimate_focal, self._known
+            self._version, self._extent = keyframes.version, keyframes.extent
+            arguments = *keyframes.spread()[:2], camera, self._settings.estimate_focal, self._known
             self._map_job = Job(self._start(map_of, *arguments), self._frame + self._latency)
 
     def _another(self, begin: tuple[Array, Mask]) -> Map | None:
@@ -150,12 +151,11 @@ class Mapper:
         if not self._ready(self._map_job):
             return None
         assert self._map_job is not None
-        assert self._seen is not None
         found, self._map_job = self._map_job.future.result(), None
         if found is None:
             return None
         self._found, self._known = found, found.rest.motion.shape
-        return nearest_first(found, *self._seen[:2], *begin)
+        return nearest_first(found, *begin)
 
     def _ready(self, job: Job | None) -> bool:
         """Whether a job's result is in force."""
@@ -167,11 +167,13 @@ def stacked(frames: list[tuple[Array, Mask]]) -> tuple[Array, Mask]:
     return np.stack([W for W, _ in frames]), np.stack([visible for _, visible in frames])
 
 
-def nearest_first(found: Map, keyframes: Array, keyframes_visible: Mask, W: Array, visible: Mask) -> Map:
-    """A map of keyframes (K, 2, p) px, posed in that one first which is most like an image (2, p) px."""
-    known = np.where(keyframes_visible[:, None], keyframes, 0.0)
-    apart = difference(np.where(visible, W, 0.0), visible, known, keyframes_visible)
-    return in_order(found, np.argsort(apart, kind="stable"))
+def nearest_first(found: Map, W: Array, visible: Mask) -> Map:
+    """A map with that pose first in which its rest shape looks most like an image (2, p) px, visible (p,)."""
+    motion, camera = found.rest.motion, found.camera
+    seen = motion.s[:, None, None] * motion.R @ motion.shape
+    image = (seen[:, :2] + motion.t[:, :, None]) / (1 + seen[:, 2:] / camera.focal_px) + camera.center_px[:, None]
+    every = np.ones((len(image), W.shape[1]), np.bool_)
+    return in_order(found, np.argsort(difference(np.where(visible, W, 0.0), visible, image, every), kind="stable"))
 
 
 def in_order(found: Map, frames: Indices) -> Map:
