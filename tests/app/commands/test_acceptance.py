@@ -147,7 +147,7 @@ def test_a_printed_sheet_is_followed(
     assert words["e3d"] <= bound
     assert words["e3d"] < words["e3d_online"] < 0.03
     assert words["e3d_static"] > 0.1
-    assert words["focal_px"] == pytest.approx(528, rel=0.03)
+    assert words["focal_px"] == pytest.approx(528, rel=0.06)
     assert words["truth_points"] >= 250
     assert words["truth_frames"] == 14
     verify(here / "paper.rrd")
