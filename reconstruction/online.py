@@ -108,12 +108,6 @@ class Reconstruction:
         return self.map.focal_note if self.map else ""
 
     @property
-    def focal_words(self) -> dict[str, float | str | None]:
-        """The focal length in force, None for an orthographic camera, and how it was found if it was looked for."""
-        note = {"focal_note": self.focal_note} if self.focal_note else {}
-        return {"focal_px": self.camera.focal_px if self.camera.perspective else None, **note}
-
-    @property
     def weights(self) -> Weights:
         """Weights of all priors, by name; empty until the rest shape decides on the deformation."""
         if self.deformation == "auto":

@@ -1,7 +1,6 @@
 """Models made by a process of their own, while frames go on."""
 
 import os
-import subprocess
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from multiprocessing.connection import Connection
@@ -15,16 +14,10 @@ NICE = 5  # frames go first
 
 
 class MapProcess:
-    """Calls functions in another process, one after the other; a context manager that ends it, whatever it does.
+    """Calls functions in another process, one after the other; a context manager that ends it, whatever it does."""
 
-    Args:
-        needed: whether there will be calls; without it there is no process.
-    """
-
-    def __init__(self, *, needed: bool = True) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
-        if needed:
-            self._process, self._connection = child("app.pipeline.map_process")
+    def __init__(self) -> None:
+        self._process, self._connection = child("app.pipeline.map_process")
         self._calls = ThreadPoolExecutor(1, thread_name_prefix="map")  # sends, and waits for what comes back
 
     def begin(self, function: Callable[..., Any], *arguments: object) -> "Future[Any]":
@@ -33,13 +26,10 @@ class MapProcess:
 
     def close(self) -> None:
         """End the process; calls that it has not answered get a UsageError."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
+        self._process.kill()
+        self._process.wait()
         self._calls.shutdown(cancel_futures=True)
-        if self._process is not None:
-            self._connection.close()
-            self._process = None
+        self._connection.close()
 
     def __enter__(self) -> Self:
         return self

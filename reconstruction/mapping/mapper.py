@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.bootstrap import bootstrap
 from reconstruction.mapping.keyframes import Keyframes, difference
 from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.settings import Settings
 
 FIRST_LOOKS = (10, 15, 20, 30, 45, 60)  # frames after which a first model is looked for; the last decides
@@ -77,7 +78,7 @@ class Mapper:
         Args:
             W: its points (2, p) px.
             visible: (p,).
-            camera: as known so far.
+            camera: its focal length may be a guess, if it is to be estimated.
             begin: the same of the frame in which another model would begin: its first pose is near that.
 
         Raises:
@@ -169,13 +170,8 @@ def stacked(frames: list[tuple[Array, Mask]]) -> tuple[Array, Mask]:
 
 def nearest_first(found: Map, W: Array, visible: Mask) -> Map:
     """A map with that pose first in which its rest shape looks most like an image (2, p) px, visible (p,)."""
-    motion, camera = found.rest.motion, found.camera
-    seen = motion.s[:, None, None] * motion.R @ motion.shape
-    image = (seen[:, :2] + motion.t[:, :, None]) / (1 + seen[:, 2:] / camera.focal_px) + camera.center_px[:, None]
+    camera, motion = found.camera, found.rest.motion
+    image = Bundle(motion, 1 / camera.focal_px).image() + camera.center_px[:, None]
     every = np.ones((len(image), W.shape[1]), np.bool_)
-    return in_order(found, np.argsort(difference(np.where(visible, W, 0.0), visible, image, every), kind="stable"))
-
-
-def in_order(found: Map, frames: Indices) -> Map:
-    """The same with the poses (K,) in another order."""
-    return replace(found, rest=replace(found.rest, motion=found.rest.motion.in_order(frames)))
+    order = np.argsort(difference(np.where(visible, W, 0.0), visible, image, every), kind="stable")
+    return replace(found, rest=replace(found.rest, motion=motion.in_order(order)))
