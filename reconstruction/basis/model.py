@@ -17,7 +17,6 @@ from reconstruction.settings import Metric
 from reconstruction.state import State
 
 COARSE_VERTICES = 60
-FITTING_SWEEPS = 15  # of pose and Λ in turn
 STAYS = 0.02  # pull of Λ to the frame before, against 1 of a mode that shows in all points
 
 
@@ -91,20 +90,19 @@ class Model:
             seen: (p,) the points to come near to.
             last: the frame before, if there is one (n >= 1): what does not show in these points stays as it was.
         """
-        rest, Upsilon, shown = self.B[:3] * self.radius, self.basis.Upsilon, seen.sum()
-        before = np.zeros((3, len(Upsilon))) if last is None else last.Lambda[-1] * self.unit
-        held = np.linalg.inv(Upsilon[:, seen] @ Upsilon[:, seen].T + STAYS * np.eye(len(Upsilon)))
-        deformation = before
-        for _ in range(FITTING_SWEEPS):
-            model = rest + deformation @ Upsilon
-            centred = [S[:, seen] - S[:, seen].sum(axis=1, keepdims=True) / shown for S in (shape, model)]
-            R = nearest_rotation(centred[0] @ centred[1].T)
-            origin = (shape - R @ model)[:, seen].sum(axis=1, keepdims=True) / shown
-            wanted = (R.T @ (shape - origin) - rest)[:, seen] @ Upsilon[:, seen].T
-            deformation = (wanted + STAYS * before) @ held
-        s = focal_px / origin[2, 0]
-        t, log_s = s * origin[:2, 0] / self.radius_px, np.log(s / self.scale)
-        return State(quaternion_from_rotation(R)[None], t[None], np.array([log_s]), deformation[None] / self.unit)
+        B = self.B if seen.all() else self.B[:, seen]
+        gram, said = B @ B.T, shape[:, seen] @ B.T / self.radius
+        shown, modes = gram[-1, -1], slice(3, -1)
+        before = np.zeros((3, len(gram) - 4)) if last is None else last.Lambda[-1]
+        model = np.concatenate([np.eye(3), before, np.zeros((3, 1))], axis=1)  # times B: the shape of the frame before
+        middle, centre = said[:, -1:] / shown, model @ gram[:, -1:] / shown
+        R = nearest_rotation(said @ model.T - shown * middle @ centre.T)
+        origin = middle - R @ centre
+        pull = STAYS * self.B.shape[1]
+        wanted = R.T @ (said - origin * gram[-1])[:, modes] - gram[:3, modes] + pull * before
+        Lambda = np.linalg.solve(gram[modes, modes] + pull * np.eye(len(gram) - 4), wanted.T).T
+        s = focal_px / (self.scale * self.radius * origin[2, 0])
+        return State(quaternion_from_rotation(R)[None], s * origin[:2].T, np.log([s]), Lambda[None])
 
     def coarse_edges(self, vertices: int = COARSE_VERTICES) -> CoarseEdges:
         """Edges of a coarse mesh through well-spread points, triangulated in the main plane."""

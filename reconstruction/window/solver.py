@@ -67,6 +67,12 @@ def minimise(energy: Energy, data: Statistics, start: State, before: Previous | 
     return Solution(state, normal.value, steps)
 
 
+def one_step(energy: Energy, data: Statistics, start: State) -> State:
+    """One Gauss-Newton step of a single frame, tied to no other: enough where `start` is near the minimum."""
+    normal = linearise(energy, data, start, None, np.zeros(1))
+    return start.moved(damped_step(normal, 0.0), energy.rows)
+
+
 def damped_step(normal: Normal, damping: float) -> Array:
     """Marquardt's step (n, d): the diagonal raised by a share of itself."""
     band = banded(normal.diagonal, normal.coupling)

@@ -18,7 +18,7 @@ from reconstruction.window.priors import FIRMEST, FITTING
 from reconstruction.window.refinement import Refinement
 from reconstruction.window.robust import robust_weights, start_weights
 from reconstruction.window.smoothness import deformation_change
-from reconstruction.window.solver import Solution, Solver, minimise
+from reconstruction.window.solver import Solution, Solver, minimise, one_step
 from reconstruction.window.statistics import Statistics, image_statistics, stack
 from reconstruction.window.terms import data_normal
 from reconstruction.window.uncertainty.uncertainty import Uncertainty
@@ -115,8 +115,8 @@ class SlidingWindow:
         data = image_statistics(
             self.model, W, robust_weights(self.model.residuals(W, expected) / self.model.radius_px, visible)
         )
-        energy = replace(self._energy, centre=expected.Lambda[0], rest=EXPECTED, edges=None, tied=False)
-        found = minimise(energy, data, expected, None, ADJUST).state
+        energy = Energy(rest=EXPECTED, centre=expected.Lambda[0], rows=self._energy.rows, tied=False)
+        found = one_step(energy, data, expected)
         # The frame before stays for the prediction.
         self.state = found if self.state is None else join([self.state[-1:], found])
         self._data, self._before = [*self._data[-1:], data], None
