@@ -115,9 +115,9 @@ class Reconstruction:
         paper = self.settings.energy == "paper"
         return priors.weights(self.settings.priors, self.deformation, perspective=self.camera.perspective, paper=paper)
 
-    def predict(self) -> Array | None:
-        """Where the next frame will see the points, (p, 2) px at constant velocity; None while frames wait for shapes."""
-        return None if self.window is None or self._waiting else self.window.predict()
+    def predict(self, ahead: int = 1) -> Array | None:
+        """Where so many frames on the points will be, (p, 2) px at constant velocity; None while frames wait for shapes."""
+        return None if self.window is None or self._waiting else self.window.predict(ahead)
 
     def update(self, W: Array, visible: Mask) -> list[ShapeEstimate]:
         """Take one frame's points (2, p) px with visibility (p,); returns the shapes now known, oldest first.

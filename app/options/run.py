@@ -68,9 +68,14 @@ class Source:
     """Where --texture lies in the first frame: X Y WIDTH HEIGHT in pixels; without it over the whole mesh."""
     opacity: float = 1.0
     """Of --texture, 0 to 1."""
+    jobs: int | None = None
+    """1: do everything in one process, one thing after the other. Without it, each stage has a process of its own where
+    there are cores for it; the shapes are the same."""
     model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
 
     def __post_init__(self) -> None:
+        if self.jobs is not None and self.jobs < 1:
+            raise UsageError(f"--jobs {self.jobs} is too few: give 1 and more")
         if self.points < 4:
             raise UsageError(f"--points {self.points} is too few: give 4 and more")
         if self.duration is not None and not self.duration > 0:

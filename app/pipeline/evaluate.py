@@ -13,7 +13,8 @@ from app.files.mesh_file import rest_of_vertices
 from app.files.writing import check_free
 from app.options.evaluate import Evaluate
 from app.pipeline.estimates import Collected, Scores, save_shapes, sigmas
-from app.pipeline.prepare import RECOVERED, settings_of
+from app.pipeline.prepare import settings_of
+from app.pipeline.stages.tracking import RECOVERED
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary

@@ -1,12 +1,12 @@
 """All frames of an object once more, with what it turned out to be."""
 
 from app.pipeline.tracked_object import TrackedObject
-from app.recording.process import RecordingProcess
+from app.recording.process import Recorder
 from app.terminal.interrupts import completed
 from app.terminal.progress import Progress
 
 
-def final_pass(tracked: TrackedObject, recording: RecordingProcess, progress: Progress) -> bool:
+def final_pass(tracked: TrackedObject, recording: Recorder, progress: Progress) -> bool:
     """Record all frames of an object again, if a map of its keyframes tells what it is; whether there was an interrupt.
 
     An interrupt waits for the end: a recording has one model for all its frames.

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Generator, Iterator
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Literal
@@ -12,20 +13,20 @@ from app.files.names import RECORDINGS, beside, free_name
 from app.files.writing import check_free
 from app.options.run import Run
 from app.pipeline.final_pass import final_pass
-from app.pipeline.map_process import MapProcess
-from app.pipeline.prefetch import Prefetch
 from app.pipeline.processed import InOrder, Processed, Surface
+from app.pipeline.stages.stages import Stages
+from app.pipeline.stages.tracking import LAG, Asked, Begun, Seen
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import Successor, options_for_another
 from app.pipeline.summary import Counts, RunSummary, summary_of
 from app.pipeline.tracked_object import FrameShape, TrackedObject
-from app.recording.process import RecordingProcess
 from app.terminal.errors import UsageError, in_a_line
 from app.terminal.interrupts import completed
 from app.terminal.progress import Progress
 from reconstruction import ReconstructionError
+from tracking import TrackingError
 from tracking.guarded import Change, Guarded
-from tracking.video import Frame, Video
+from tracking.video import Frame
 
 
 class Session:
@@ -53,7 +54,6 @@ class Session:
         for path in (config.output.out, config.output.tracks_out, config.output.shapes_out):
             check_free(path, overwrite=config.output.overwrite)
         self._watch, self._counts, self._order = Stopwatch(), Counts(), InOrder()
-        self._messages: list[str] = []  # of the source, to be recorded with the next frame
         self._surface: Surface | None = None
         self._successor: Successor | None = None
         self.recordings: list[Path] = []
@@ -73,99 +73,95 @@ class Session:
         Raises:
             UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
         """
-        config, output = self._config, self._config.output
-        video = Video(
-            config.source, *config.frame_range, duration_s=config.duration, drop_late=config.drop_late, log=self._told
-        )
-        with threadpool_limits(1), video, MapProcess() as self._maps:
-            source = iter(video)
-            first, second = next(source), next(source, None)
-            if second is None:
-                raise UsageError(f"{config.source} gives only one frame: give a video, or more --frames")
-            self.fps = video.fps
-            self._object = self._first_object = TrackedObject(config, first, self._watch, self._maps.begin)
-            self._path = output.out or (free_name(RECORDINGS, config.source) if self._record_unnamed else None)
+        with threadpool_limits(1), Stages(self._config) as stages:
+            self._tracking, self._begin_map, self.fps = stages.tracking, stages.begin_map, stages.tracking.opened.fps
+            for _ in range(LAG):
+                self._tracking.send(Asked({0: None}))
+            first, second = self._tracking.receive(), self._tracking.receive()
+            if first is None or second is None:
+                raise UsageError(f"{self._config.source} gives only one frame: give a video, or more --frames")
+            self._object = self._first_object = self._begun(first)
+            output = self._config.output
+            self._path = output.out or (free_name(RECORDINGS, self._config.source) if self._record_unnamed else None)
             needed = bool(self._path or output.connect or output.view)
-            self._wanted_again = needed or bool(output.shapes_out or config.ground_truth)
-            prefetch = Prefetch(chain([second], source))
-            with RecordingProcess(needed=needed) as self._recording, self._progress, prefetch as self._prefetch:
+            self._wanted_again = needed or bool(output.shapes_out or self._config.ground_truth)
+            with stages.recording(needed=needed) as self._recording, self._progress:
                 self._watch.start()
-                self._progress.expect(video.frame_count)
+                self._progress.expect(self._tracking.opened.frame_count)
                 self._open_recording(first)
-                yield from self._objects(first)
+                yield from self._objects(chain([first, second], iter(self._tracking.receive, None)))
 
-    def _told(self, text: str) -> None:
-        """What the source has to tell, in its own thread."""
-        self._progress.log(text)
-        self._messages.append(text)
+    def _begun(self, seen: Seen) -> TrackedObject:
+        """The first object. Raises the error if there is none."""
+        points = seen.objects[0]
+        if isinstance(points, TrackingError):
+            raise points
+        assert isinstance(points, Begun)
+        first = Frame(seen.index, seen.time_s, self._tracking.picture(seen.number, keep=True))
+        return TrackedObject(self._config, 0, first, points.points_px, self._watch, self._begin_map)
 
-    def _objects(self, frame: Frame | None) -> Iterator[Processed]:
-        """One object after another, from this frame on."""
-        while frame is not None:
-            try:
-                frame = yield from self._follow(frame)
-            except KeyboardInterrupt:
-                self.interrupted, frame = True, None
-            except GeneratorExit:
-                self.interrupted = True
-                self._end_object(last=True)
-                raise
-            self._end_object(last=frame is None)
-            if frame is not None:
-                self._begin_another(frame)
+    def _objects(self, source: Iterator[Seen]) -> Iterator[Processed]:
+        """The frames of one object after another."""
+        try:
+            for seen in source:
+                if self._successor and self._successor.found:
+                    self._end_object(last=False)
+                    self._begin_another(seen)
+                with completed():
+                    self._process(seen)
+                yield from self._order.ready()
+                if self.interrupted:
+                    break
+        except KeyboardInterrupt:
+            self.interrupted = True
+        except (GeneratorExit, UsageError, TrackingError):  # nobody wants more; the source or a stage has ended
+            self.interrupted = True
+            self._end_object(last=True)
+            raise
+        self._end_object(last=True)
         yield from self._order.ready()
 
-    def _follow(self, frame: Frame | None) -> Generator[Processed, None, Frame | None]:
-        """Follow the object to the end of the source, None, or until another is found: the frame that this begins with."""
-        while frame is not None and not self.interrupted:
-            if self._successor and self._successor.found:
-                return frame
-            with completed():
-                guarded = self._object.follow(frame)
-                if not self._config.drop_late:  # what is fetched early is late
-                    self._prefetch.begin(self._object.prepare)
-                self._tell_changes(frame, guarded)
-                self._reconstruct(frame, guarded)
-                if self._config.drop_late:
-                    self._prefetch.begin(self._object.prepare)
-            yield from self._order.ready()
-            with self._watch.time("decode"):
-                frame = self._prefetch.fetched()
-            with self._watch.time("track"):
-                self._prefetch.prepared()
-        return None
+    def _process(self, seen: Seen) -> None:
+        """Make shapes of a frame's points, record what is known, and ask for another frame."""
+        tracked = self._object
+        points = seen.objects[tracked.number]
+        assert not isinstance(points, TrackingError)
+        guarded = tracked.follow(points)
+        image = self._tracking.picture(seen.number, keep=self._order.wanted)
+        frame = Frame(seen.index, seen.time_s, image)
+        self._tell_changes(seen, guarded)
+        self._counts.add(guarded, lost=tracked.lost)
+        self._order.add(frame, guarded.observation)
+        if tracked.lost and self._surface:
+            self._order.end(self._surface)
+        phase = tracked.phase
+        shapes = tracked.shape(seen.index, seen.time_s, guarded.observation)
+        expected_px = {tracked.number: tracked.expected_px}
+        if self._successor:
+            self._successor.look(seen, partial(self._tracking.picture, seen.number, keep=True))
+            expected_px |= self._successor.expected_px
+        self._tracking.send(Asked(expected_px))  # as early as can be: it is waited for
+        with self._watch.time("record"):
+            self._split_recording(seen)
+            self._recording.observe(frame, seen.number, guarded.observation, phase=phase.value)
+            self._record(shapes)
+        self._watch.add(seen.stage_ms)
+        self._recording.tell("timing", seen.index, seen.time_s, dict(self._watch.now))
+        self._watch.now.clear()
+        self._progress.advance(tracked.phase.value, tracked.collected.last_rms_px)
 
-    def _tell_changes(self, frame: Frame, guarded: Guarded) -> None:
+    def _tell_changes(self, seen: Seen, guarded: Guarded) -> None:
         """Record what the source told, and that the object was lost or found."""
-        while self._messages:
-            self._recording.tell("event", frame.index, frame.time_s, self._messages.pop(0), "WARN")
+        for text in seen.told:
+            self._note(seen.index, seen.time_s, text, "WARN")
         if guarded.change is Change.NONE:
             return
         if guarded.change is Change.LOST:
             config = options_for_another(self._config, self._counts.objects + 1)
-            self._successor = Successor(config, frame, self._watch, self._maps.begin, cut=guarded.cut)
+            self._successor = Successor(config, seen, self._object.number, self._watch, self._begin_map, cut=guarded.cut)
         else:
             self._successor = None
-        self._note(frame.index, frame.time_s, f"{guarded.change.value} at frame {frame.index}: {guarded.reason}", "WARN")
-
-    def _reconstruct(self, frame: Frame, guarded: Guarded) -> None:
-        """Make shapes of a frame's points, and record what is known."""
-        tracked, observation = self._object, guarded.observation
-        self._counts.add(guarded, lost=tracked.lost)
-        self._order.add(frame, observation)
-        if tracked.lost and self._surface:
-            self._order.end(self._surface)
-        phase = tracked.phase
-        shapes = tracked.shape(frame, observation)
-        if self._successor:
-            self._successor.look(frame)
-        with self._watch.time("record"):
-            self._split_recording(frame)
-            self._recording.tell("observe", tracked.recorded(frame), observation, phase=phase.value)
-            self._record(shapes)
-        self._recording.tell("timing", frame.index, frame.time_s, dict(self._watch.now))
-        self._watch.now.clear()
-        self._progress.advance(tracked.phase.value, tracked.collected.last_rms_px)
+        self._note(seen.index, seen.time_s, f"{guarded.change.value} at frame {seen.index}: {guarded.reason}", "WARN")
 
     def _record(self, shapes: list[FrameShape]) -> None:
         """Record shapes; with the first of a model, the model."""
@@ -191,10 +187,12 @@ class Session:
 
         Raises:
             ReconstructionError: the last object has too few frames for a rest shape, and nobody interrupted it.
+            UsageError: a stage has ended; all that is known is saved before.
         """
+        failed: UsageError | None = None
         try:
             self._record(self._object.finish())
-        except ReconstructionError as error:
+        except (ReconstructionError, UsageError) as error:
             if last and not self.interrupted:
                 raise
             self._progress.log(in_a_line(error))
@@ -202,7 +200,10 @@ class Session:
             self._order.end(self._surface)
             self._watch.stop()
         if self._wanted_again and not self.interrupted:
-            self.interrupted = final_pass(self._object, self._recording, self._progress)
+            try:
+                self.interrupted = final_pass(self._object, self._recording, self._progress)
+            except UsageError as error:
+                failed = error
         if last:
             self.summary = self._summary(self._first_object)
         self._recording.tell("summary", self._summary(self._object).as_dict())
@@ -210,8 +211,10 @@ class Session:
             model = self._object.reconstruction.model
             self._recording.tell("modes", model.basis, model.mesh, self._object.surface.metric)
         self._object.save()
+        if failed is not None:
+            raise failed
 
-    def _begin_another(self, frame: Frame) -> None:
+    def _begin_another(self, frame: Seen) -> None:
         """From this frame on the successor is followed, in a recording of its own."""
         assert self._successor is not None
         assert self._successor.found is not None
@@ -223,7 +226,7 @@ class Session:
         self._recording.tell("event", frame.index, frame.time_s, text, "WARN")  # where the other begins
         self._begin_surface(frame.index, frame.time_s)
 
-    def _open_recording(self, frame: Frame) -> None:
+    def _open_recording(self, frame: Seen) -> None:
         """Write another recording from a frame on: the first, of another object, or the next part of a long one."""
         self._opened_s = frame.time_s
         path, part = self._path, len(self.recordings) + 1
@@ -232,7 +235,7 @@ class Session:
         self.recordings += [path] if path else []
         self._recording.tell("open", path, **self._object.recording_options)
 
-    def _split_recording(self, frame: Frame) -> None:
+    def _split_recording(self, frame: Seen) -> None:
         """Go on in another file, if it is time."""
         minutes = self._config.output.split_minutes
         if minutes and self._surface and frame.time_s - self._opened_s >= 60.0 * minutes:

@@ -1,6 +1,6 @@
 """How long the stages of a run take."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -38,6 +38,10 @@ class Stopwatch:
         try:
             yield
         finally:
-            elapsed = (perf_counter() - started) * 1e3
-            self.now[stage] = self.now.get(stage, 0.0) + elapsed
-            self.total[stage] += elapsed
+            self.add({stage: (perf_counter() - started) * 1e3})
+
+    def add(self, stage_ms: Mapping[str, float]) -> None:
+        """Add what stages took elsewhere."""
+        for stage, milliseconds in stage_ms.items():
+            self.now[stage] = self.now.get(stage, 0.0) + milliseconds
+            self.total[stage] += milliseconds

@@ -1,12 +1,15 @@
 """What is followed when an object does not come back: another one, if there is one that moves."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 
+from app.arrays import Array, Image
 from app.files.names import beside
 from app.options.run import Run
-from app.pipeline.prepare import RECOVERED
+from app.pipeline.stages.tracking import RECOVERED, Begun, Seen
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
 from reconstruction import ReconstructionError
@@ -30,20 +33,22 @@ class Successor:
     Args:
         config: what holds for the other object.
         lost: the frame in which the object was lost.
-        cut: whether that was a cut.
+        number: of the object that is lost.
         watch: to time it.
-        start: where models are made.
+        start: begins to make models.
+        cut: whether the object was lost in a cut.
 
     Attributes:
-        lost: the same.
         found: the other object, once it has a model.
     """
 
-    def __init__(self, config: Run, lost: Frame, watch: Stopwatch, start: Start, *, cut: bool) -> None:
-        self.lost = lost
+    def __init__(self, config: Run, lost: Seen, number: int, watch: Stopwatch, start: Start, *, cut: bool) -> None:
         self.found: TrackedObject | None = None
+        self._lost = lost.index
         self._config, self._watch, self._start = config, watch, start
         self._due_s = lost.time_s + (AFTER_CUT_S if cut else AFTER_COVER_S)
+        self._numbers = count(number + 1)
+        self._number: int | None = None  # of the one that is tried
         self._tried: TrackedObject | None = None
         self._moves = False
 
@@ -51,33 +56,45 @@ class Successor:
     def history(self) -> str:
         """How it came about, in words."""
         assert self.found is not None
-        return (
-            f"followed since frame {self.found.first.index}, nothing seen of the one before since frame {self.lost.index}"
-        )
+        return f"followed since frame {self.found.first.index}, nothing seen of the one before since frame {self._lost}"
 
-    def look(self, frame: Frame) -> None:
+    @property
+    def expected_px(self) -> Mapping[int, Array | None]:
+        """What to follow of it, as `Asked` takes it."""
+        return {} if self._number is None else {self._number: self._tried.expected_px if self._tried else None}
+
+    def look(self, seen: Seen, picture: Callable[[], Image]) -> None:
         """See what is in the next frame; what cannot be followed, or gives no model, is given up, and tried again later."""
-        if self._tried is None and frame.time_s < self._due_s:
+        if self._number is None:
+            if seen.time_s >= self._due_s:
+                self._number = next(self._numbers)
+            return
+        if self._number not in seen.objects:  # asked for, but frames before that are still on the way
             return
         try:
-            if self._tried is None:
-                with self._watch.time("track"):
-                    self._tried, self._moves = TrackedObject(self._config, frame, self._watch, self._start), False
-            good = self._goes_on(self._tried, frame)
-        except (TrackingError, ReconstructionError):
+            good = self._goes_on(self._number, seen, picture)
+        except ReconstructionError:
             good = False
         if not good:
-            self._tried, self._due_s = None, frame.time_s + AGAIN_S
+            self._number, self._tried, self._due_s = None, None, seen.time_s + AGAIN_S
 
-    def _goes_on(self, tried: TrackedObject, frame: Frame) -> bool:
-        observation = tried.follow(frame).observation
+    def _goes_on(self, number: int, seen: Seen, picture: Callable[[], Image]) -> bool:
+        points = seen.objects[number]
+        if isinstance(points, TrackingError):
+            return False
+        if isinstance(points, Begun):
+            first = Frame(seen.index, seen.time_s, picture())
+            self._tried = TrackedObject(self._config, number, first, points.points_px, self._watch, self._start)
+            self._moves = False
+        assert self._tried is not None
+        observation = self._tried.follow(points).observation
         if observation.visible.mean() < SEEN:  # as when it is lost
             return False
-        self._moves = self._moves or way_px(tried, observation) > MOVES_PX
+        self._moves = self._moves or way_px(self._tried, observation) > MOVES_PX
         if self._moves:
-            tried.shape(frame, observation)
-            if tried.phase is Phase.TRACKING:
-                self.found = tried
+            self._tried.shape(seen.index, seen.time_s, observation)
+            if self._tried.phase is Phase.TRACKING:
+                self.found = self._tried
         return True
 
 

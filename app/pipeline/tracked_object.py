@@ -1,29 +1,29 @@
-"""One object of a run: its points, who follows them, who makes shapes of them, and what is kept of it."""
+"""One object of a run: its points, who makes shapes of them, and what is kept of it."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from app.arrays import Array
 from app.files.stored_tracks import StoredFrame, StoredTracks
 from app.files.writing import writable
 from app.options.run import Run, configuration
 from app.painting.compositing import Placement, painted
 from app.painting.picture import first_picture
 from app.pipeline.estimates import Collected, Scores, save_shapes
-from app.pipeline.prepare import prepared
+from app.pipeline.prepare import estimator
 from app.pipeline.processed import Surface
+from app.pipeline.stages.tracking import LAG, Begun
 from app.pipeline.stopwatch import Stopwatch
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.mapper import Start
 from reconstruction.online import Phase
-from tracking.guarded import Change, Guarded, GuardedTracker
+from tracking.guarded import Change, Guarded
 from tracking.klt import Observation
 from tracking.tracks import Tracks, Truth
 from tracking.video import Frame
-
-NO_PICTURE = np.empty((0, 0, 3), np.uint8)
 
 
 @dataclass(frozen=True)
@@ -40,37 +40,40 @@ class TrackedObject:
 
     Args:
         config: what the person asked for.
+        number: its own, among the objects of the run.
         first: that frame.
+        points_px: (P, 2) its points in it.
         watch: to time it.
-        start: where its models are made.
+        start: begins to make its models.
 
     Attributes:
-        config, first: the same.
-        points_px: (P, 2) its points in the first frame.
+        config, number, first, points_px: the same.
+        lost: whether it is lost.
         reconstruction: its estimator.
         collected: its estimates.
         online: its estimates as they were shown on the way, if there was another pass; else None.
 
     Raises:
-        UsageError, TrackingError: a region, mask, mesh or truth that does not fit, or too few corners.
+        UsageError, TrackingError: a mesh or truth that does not fit.
     """
 
-    def __init__(self, config: Run, first: Frame, watch: Stopwatch, start: Start) -> None:
-        self.config, self.first, self._watch = config, first, watch
+    def __init__(self, config: Run, number: int, first: Frame, points_px: Array, watch: Stopwatch, start: Start) -> None:
+        self.config, self.number, self.first, self.points_px, self._watch = config, number, first, points_px, watch
         self._truth = Truth.load(config.ground_truth) if config.ground_truth else None
         self.collected = self._nothing()
         self.online: Collected | None = None
         self._texture = first_picture(config.texture) if config.texture else None
-        self.points_px, self.reconstruction = prepared(config, first, start)
-        self._tracker = GuardedTracker(first.image, self.points_px)
+        height, width = first.image.shape[:2]
+        self.reconstruction = estimator(config, (width, height), points_px, start)
+        self.lost = False
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
         stored = config.passes or config.output.tracks_out
         self._stored = StoredTracks(len(self.points_px)) if stored else None
 
     @property
-    def lost(self) -> bool:
-        """Whether the object is lost."""
-        return self._tracker.lost
+    def expected_px(self) -> Array | None:
+        """Where its points are expected (P, 2) in the frame that is tracked when it has seen this one."""
+        return None if self.lost else self.reconstruction.predict(LAG)
 
     @property
     def phase(self) -> Phase:
@@ -109,36 +112,28 @@ class TrackedObject:
             "keep_online": output.keep_online and self.config.passes,
         }
 
-    def recorded(self, frame: Frame) -> Frame:
-        """What its recording needs of a frame: the picture is left out if it is not stored."""
-        return frame if self.config.output.image == "jpeg" else replace(frame, image=NO_PICTURE)
-
-    def prepare(self, frame: Frame) -> None:
-        """Do what can be done early with the next frame, in another thread."""
-        self._tracker.begin(frame.image)
-
-    def follow(self, frame: Frame) -> Guarded:
-        """Find the points in the next frame, or in the first."""
-        if frame is self.first:
+    def follow(self, seen: Begun | Guarded) -> Guarded:
+        """What the next frame shows of it."""
+        if isinstance(seen, Begun):
             return Guarded(Observation(self.points_px, np.ones(len(self.points_px), np.bool_)))
-        with self._watch.time("track"):
-            guarded = self._tracker.track(frame.image, self.reconstruction.predict())
-        if guarded.change is Change.RECOVERED:  # nothing ties it to where it was
+        if seen.change is not Change.NONE:
+            self.lost = seen.change is Change.LOST
+        if seen.change is Change.RECOVERED:  # nothing ties it to where it was
             self.reconstruction.restart()
-        return guarded
+        return seen
 
-    def shape(self, frame: Frame, observation: Observation) -> list[FrameShape]:
-        """The shapes known with this frame, oldest first; none of it while the object is lost.
+    def shape(self, index: int, time_s: float, observation: Observation) -> list[FrameShape]:
+        """The shapes known with a frame of the source, oldest first; none of it while the object is lost.
 
         Raises:
             ReconstructionError: no rest shape can be had.
         """
         if self._stored is not None:
-            self._stored.add(StoredFrame(frame.index, frame.time_s, observation, self.lost))
+            self._stored.add(StoredFrame(index, time_s, observation, self.lost))
         if self.lost:
-            self.collected.lose(frame.index)
+            self.collected.lose(index)
             return self._of_frames(self.reconstruction.catch_up())
-        self._times[frame.index] = frame.time_s
+        self._times[index] = time_s
         with self._watch.time("reconstruct"):
             return self._of_frames(self.reconstruction.update(observation.points_px.T, observation.visible))
 

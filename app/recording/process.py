@@ -1,52 +1,155 @@
-"""Recordings written by a process of their own, so that Rerun's work and JPEG take nothing from the frame loop."""
+"""The stage that writes recordings: in a process of its own, Rerun's work and JPEG take nothing from the frame loop."""
 
 import os
 import pickle
 import subprocess
+import sys
+from dataclasses import replace
 from queue import Queue
 from threading import Thread
 from types import TracebackType
-from typing import Any, Self, cast
+from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
-from app.child import child, connection_to_parent
+import numpy as np
+
+from app.child import child, connection_to_parent, inherited_file
+from app.pipeline.stages.ring import Ring
 from app.terminal.errors import UsageError
+from tracking.video import Frame
+
+if TYPE_CHECKING:
+    from app.recording.recording import Recording
 
 MOST_WAITING = 64  # calls, some ten frames: then the run waits for the disk
 
-Call = tuple[str, tuple[Any, ...], dict[str, Any]]
+NO_PICTURE = np.empty((0, 0, 3), np.uint8)
+
+Call = tuple[str, tuple[Any, ...], dict[str, Any], int | None]  # with the number of the picture of a frame
+
+
+class Recorder(Protocol):
+    """Calls the methods of a `Recording`, one after another."""
+
+    def tell(self, method: str, *arguments: object, **named: object) -> None:
+        """Call a method, soon, with arguments that do not change until then.
+
+        "open" stands for the constructor: another file from here on, the one before is completed.
+
+        Raises:
+            what a call raised.
+        """
+
+    def observe(self, frame: Frame, number: int, *arguments: object, **named: object) -> None:
+        """Call `Recording.observe` for a frame whose picture may be elsewhere, and has this number there."""
+
+
+class Recordings:
+    """One recording after another: what a call names is done at once.
+
+    Once something went wrong nothing more is written: Rerun would keep it, and wait.
+    """
+
+    def __init__(self) -> None:
+        self._recording: Recording | None = None
+        self._failed = False
+
+    def call(self, method: str, *arguments: Any, **named: Any) -> None:
+        """Call a method of the recording; "open" begins another.
+
+        Raises:
+            whatever goes wrong.
+        """
+        from app.recording.recording import Recording  # Rerun takes its time to load
+
+        try:
+            if method == "open":
+                if not self._failed:
+                    self.close()
+                    self._recording = Recording(*arguments, **named)
+            elif self._recording is not None and (method == "leave" or not self._failed):
+                getattr(self._recording, method)(*arguments, **named)
+        except Exception:
+            self._failed = True
+            raise
+
+    def close(self) -> None:
+        """Complete the last one, if all went well."""
+        if self._recording is not None and not self._failed:
+            self._recording.close()
+
+
+class RecordingHere:
+    """Recordings written in this process; a context manager that completes the last.
+
+    Args:
+        needed: whether anything is written.
+    """
+
+    def __init__(self, *, needed: bool = True) -> None:
+        self._recordings = Recordings() if needed else None
+
+    def tell(self, method: str, *arguments: object, **named: object) -> None:
+        """Call it now."""
+        if self._recordings is not None:
+            self._recordings.call(method, *arguments, **named)
+
+    def observe(self, frame: Frame, number: int, *arguments: object, **named: object) -> None:  # noqa: ARG002
+        """The frame has its picture."""
+        self.tell("observe", frame, *arguments, **named)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        recordings, self._recordings = self._recordings, None
+        if recordings is None:
+            return
+        try:
+            recordings.call("leave", failed=isinstance(error, Exception))
+        except Exception:
+            if error is None:  # what ended the run matters more
+                raise
 
 
 class RecordingProcess:
-    """Calls the methods of a `Recording` in another process; a context manager that completes its file.
+    """Recordings written in another process; a context manager that completes the last.
 
     What goes wrong there is raised by a later call here, or at the end. The process completes the file when nothing more
     comes, also because the run was killed.
 
     Args:
         needed: whether anything is written; without it there is no process, and nothing happens.
+        pictures: where the pictures of frames are, if they are not told; each is released when it is written.
+        file: the `shared_file` of them.
     """
 
-    def __init__(self, *, needed: bool = True) -> None:
+    def __init__(self, *, needed: bool = True, pictures: Ring | None = None, file: int | None = None) -> None:
         self._error: BaseException | None = None
         self._waiting: Queue[Call | None] = Queue(MOST_WAITING)
         self._process: subprocess.Popen[bytes] | None = None
+        self._pictures = pictures
         if not needed:
+            if pictures is not None:
+                pictures.release_all()
             return
-        self._process, self._connection = child("app.recording.process")
+        self._process, self._connection = child("app.recording.process", *([] if file is None else [file]))
         self._sender = Thread(target=self._send, name="record", daemon=True)
         self._sender.start()
 
     def tell(self, method: str, *arguments: object, **named: object) -> None:
-        """Call a method of the recording, later, with arguments that do not change until then.
-
-        "open" stands for the recording's constructor: another file from here on, the one before is completed.
-
-        Raises:
-            what an earlier call raised there.
-        """
+        """Call a method of the recording, later."""
         self._raise()
         if self._process is not None:
-            self._waiting.put((method, arguments, named))
+            self._waiting.put((method, arguments, named, None))
+
+    def observe(self, frame: Frame, number: int, *arguments: object, **named: object) -> None:
+        """The picture is left where it is."""
+        if self._pictures is None:
+            self.tell("observe", frame, *arguments, **named)
+            return
+        self._raise()
+        if self._process is not None:
+            self._waiting.put(("observe", (replace(frame, image=NO_PICTURE), *arguments), named, number))
 
     def close(self, *, failed: bool = False) -> None:
         """Complete the file as `Recording.leave` does, and return when that is done; a second time, nothing.
@@ -56,7 +159,7 @@ class RecordingProcess:
         """
         process, self._process = self._process, None
         if process is not None:
-            self._waiting.put(("leave", (), {"failed": failed}))
+            self._waiting.put(("leave", (), {"failed": failed}, None))
             self._waiting.put(None)
             self._sender.join()
             process.wait()
@@ -77,6 +180,8 @@ class RecordingProcess:
         """Send what waits; the first thing that goes wrong is kept for the run's own thread."""
         calls = iter(self._waiting.get, None)
         try:
+            if self._pictures is not None:
+                self._connection.send(self._pictures.size)
             for call in calls:
                 self._connection.send_bytes(pickle.dumps(call, protocol=5))
                 while self._connection.poll():
@@ -87,6 +192,8 @@ class RecordingProcess:
             gone = "the process that writes the recording has ended: the memory or the disk may be full"
             self._fail(UsageError(gone) if isinstance(error, OSError | EOFError) else error)
             self._connection.close()  # the process completes the file
+            if self._pictures is not None:
+                self._pictures.release_all()
             for _ in calls:  # the run does not wait for what nobody reads
                 pass
 
@@ -110,30 +217,25 @@ def main() -> None:
     """What the other process does: exceptions are sent back, and None once everything is written."""
     import cv2
 
-    from app.recording.recording import Recording
-
     cv2.setNumThreads(1)
     connection = connection_to_parent()
-    recording: Recording | None = None
-    failed = False
+    recordings = Recordings()
     method = ""
     try:
+        pictures = Ring(inherited_file(2), connection.recv()) if len(sys.argv) > 2 else None
         while method != "leave":
-            method, arguments, named = cast(Call, pickle.loads(connection.recv_bytes()))
+            method, arguments, named, number = cast(Call, pickle.loads(connection.recv_bytes()))
+            if pictures is not None and number is not None:
+                arguments = (replace(arguments[0], image=pictures.picture(number)), *arguments[1:])
             try:
-                if method == "open" and not failed:
-                    if recording is not None:
-                        recording.close()
-                    recording = Recording(*arguments, **named)
-                elif recording is not None and (method == "leave" or not failed):  # else Rerun would keep it, and wait
-                    getattr(recording, method)(*arguments, **named)
+                recordings.call(method, *arguments, **named)
             except Exception as error:  # raised in the run's process
-                failed = True
                 connection.send(error)
+            if pictures is not None and number is not None:
+                pictures.release(number)
         connection.send(None)
     except (EOFError, OSError):  # the run was killed: what it told until then is written
-        if recording is not None and not failed:
-            recording.close()
+        recordings.close()
     os._exit(0)  # what Rerun could not write, it would wait for
 
 

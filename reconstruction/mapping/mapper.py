@@ -57,9 +57,8 @@ class Mapper:
         first_frames: so many gave the first model.
     """
 
-    def __init__(self, settings: Settings, start: Start = at_once, *, live: bool = False) -> None:
-        self._settings, self._start, self.live = settings, start, live
-        self._latency = 0 if start is at_once else LATENCY
+    def __init__(self, settings: Settings, start: Start = at_once, *, latency: int = 0, live: bool = False) -> None:
+        self._settings, self._start, self._latency, self.live = settings, start, latency, live
         self._keyframes = Keyframes() if settings.maps else None
         self._frame = -1
         self._first: list[tuple[Array, Mask]] | None = []  # frames, until they have given the first model

@@ -128,12 +128,16 @@ class SlidingWindow:
             self._lost = self.state[-1:]
         self.state, self._before, self._data = None, None, []
 
-    def predict(self) -> Array | None:
-        """Image (p, 2) px of the next frame at constant velocity; None before the first frame."""
+    def predict(self, ahead: int = 1) -> Array | None:
+        """Image (p, 2) px so many frames on at constant velocity; None before the first frame."""
         if self.state is None:
             return None
         last = self.state[-1:]
-        return self.model.projection(extrapolated(self.state[-2:-1], last) if len(self.state) > 1 else last).T
+        if len(self.state) > 1:
+            before = self.state[-2:-1]
+            for _ in range(ahead):
+                before, last = last, extrapolated(before, last)
+        return self.model.projection(last).T
 
     def _last_shape(self) -> Array:
         """The last frame's shape (3, p), px, its first two rows as seen by the camera."""

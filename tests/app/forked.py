@@ -33,9 +33,11 @@ class Forked:
             os.kill(self._pid, signal.SIGKILL)
 
     def wait(self) -> None:
-        while os.read(self._lifeline, 16):
-            pass
-        os.close(self._lifeline)
+        if self._lifeline >= 0:
+            while os.read(self._lifeline, 16):
+                pass
+            os.close(self._lifeline)
+        self._lifeline = -1
 
 
 @cache
@@ -49,35 +51,36 @@ def loaded() -> socket.socket:
     return ours
 
 
-def started(module: str, file: int) -> Forked:
+def started(module: str, *files: int) -> Forked:
     """In place of `app.child.started`."""
     lifeline, theirs = os.pipe()
-    socket.send_fds(loaded(), [f"{module} {Path.cwd()}".encode()], [file, theirs, 2])
+    socket.send_fds(loaded(), [f"{module} {Path.cwd()}".encode()], [theirs, 2, *files])
     os.close(theirs)
     return Forked(lifeline)
 
 
 def main() -> None:
-    from app.pipeline import map_process  # noqa: F401
+    from app.pipeline.stages import maps, tracking_process  # noqa: F401
     from app.recording import modes_figure, process, recording  # noqa: F401
     from reconstruction.mapping import mapper  # noqa: F401
 
     asked = socket.socket(fileno=int(sys.argv[1]))
     signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for the forks
     while True:
-        words, files, _, _ = socket.recv_fds(asked, 4096, 3)
+        words, files, _, _ = socket.recv_fds(asked, 4096, 8)
         if not files:
             os._exit(0)
+        lifeline, errors, *theirs = files
         if not os.fork():
             module, folder = words.decode().split(" ", 1)
             asked.close()
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
             os.setsid()
             os.chdir(folder)
-            os.write(files[1], str(os.getpid()).encode())
+            os.write(lifeline, str(os.getpid()).encode())
             for output in (1, 2):
-                os.dup2(files[2], output)
-            sys.argv[1] = str(files[0])
+                os.dup2(errors, output)
+            sys.argv[1:] = map(str, theirs)
             import_module(module).main()
         for file in files:
             os.close(file)

@@ -67,7 +67,7 @@ def test_a_throttled_pipeline_stays_up_to_date(camera: Camera, monkeypatch: pyte
 
     monkeypatch.setattr(GuardedTracker, "track", noted)
     run = Run(
-        source=camera.url, roi=(40, 40, 240, 160), points=100, rest_shape="plane", drop_late=True, duration=5.0,
+        source=camera.url, roi=(40, 40, 240, 160), points=100, rest_shape="plane", drop_late=True, duration=5.0, jobs=1,
         model=Model(modes=5, bootstrap_frames=5), output=Output(out=Path("live.rrd")),
     )  # fmt: skip
     words = Session(run, Throttled()).run().as_dict()

@@ -2,6 +2,8 @@
 
 import json
 from collections.abc import Iterable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -14,6 +16,7 @@ from app.options.model import Model
 from app.options.retexture import Retexture
 from app.options.run import Output, Run
 from app.pipeline.session import Session
+from app.pipeline.stages.tracking import Begun, Seen, first_points
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import AFTER_CUT_S, Successor, options_for_another
 from app.playback.playback import Playback
@@ -22,7 +25,9 @@ from reconstruction.mapping.mapper import at_once
 from tests.app.command_line import Command, grain, in_own_process, turning, write_video
 from tests.synthetic_run import verify
 from tests.tracking.scene import SIZE, texture
-from tracking.video import Frame, Video
+from tracking import TrackingError
+from tracking.guarded import Guarded, GuardedTracker
+from tracking.video import Video
 
 Image = NDArray[np.uint8]
 
@@ -202,13 +207,23 @@ def test_a_batch_keeps_the_parts(modeshape: Command, two_scenes: Path, here: Pat
 def test_what_is_covered_has_longer_than_what_was_cut(cut: bool, wait_s: float) -> None:
     config = Run("video.mp4", points=100, rest_shape="plane", model=Model(modes=5, bootstrap_frames=5))
     pictures = list(another(60))
-    successor = Successor(config, Frame(0, 100.0, pictures[0]), Stopwatch(), at_once, cut=cut)
+    lost = Seen(0, 0, 100.0, {}, (), {})
+    successor = Successor(config, lost, 0, Stopwatch(), at_once, cut=cut)
+    trackers: dict[int, GuardedTracker] = {}
     for index, picture in enumerate(pictures):
-        successor.look(Frame(index, 100.0 + wait_s - 1.0 + index / 30, picture))
+        objects: dict[int, Begun | Guarded | TrackingError] = {}
+        for one, expected_px in successor.expected_px.items():
+            if one in trackers:
+                objects[one] = trackers[one].track(picture, expected_px)
+            else:
+                objects[one] = begun = Begun(first_points(config, picture))
+                trackers[one] = GuardedTracker(picture, begun.points_px)
+        seen = replace(lost, index=index, time_s=100.0 + wait_s - 1.0 + index / 30, objects=objects)
+        successor.look(seen, partial(np.copy, picture))
         if successor.found:
             break
     assert successor.found is not None
-    assert successor.found.first.index == 30
+    assert successor.found.first.index == 31  # one after it was asked for
 
 
 def test_what_was_said_of_the_first_object_does_not_go_for_another() -> None:

@@ -73,7 +73,7 @@ def test_maps_made_elsewhere_are_in_force_after_a_fixed_number_of_frames() -> No
         return future
 
     first = FIRST_LOOKS[-1] - 1
-    assert adopted(Mapper(Settings(), soon), range(first + LATENCY + 2))[:2] == [first, first + LATENCY]
+    assert adopted(Mapper(Settings(), soon, latency=LATENCY), range(first + LATENCY + 2))[:2] == [first, first + LATENCY]
 
 
 def test_live_ones_are_in_force_as_soon_as_they_are_there() -> None:

@@ -5,7 +5,7 @@ import signal
 import numpy as np
 import pytest
 
-from app.pipeline.map_process import MapProcess
+from app.pipeline.stages.maps import MapProcess
 from app.terminal.errors import UsageError
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
@@ -34,8 +34,7 @@ def test_errors_come_back() -> None:
 
 def test_a_killed_process_is_told_of() -> None:
     with MapProcess() as maps:
-        assert maps._process is not None
-        maps._process.kill()
+        maps._remote.end()
         with pytest.raises(UsageError, match="has ended"):
             maps.begin(len, ()).result()
 

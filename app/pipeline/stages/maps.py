@@ -1,0 +1,48 @@
+"""The stage that makes models, while frames go on."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import TracebackType
+from typing import Any, Self
+
+from app.child import Remote, connection_to_parent, serve
+
+NICE = 5  # frames go first
+
+
+class MapProcess:
+    """Calls functions in another process, one after the other; a context manager that ends it, whatever it does."""
+
+    def __init__(self) -> None:
+        self._remote = Remote("app.pipeline.stages.maps", "makes the models")
+        self._calls = ThreadPoolExecutor(1, thread_name_prefix="map")  # sends, and waits for what comes back
+
+    def begin(self, function: Callable[..., Any], *arguments: object) -> "Future[Any]":
+        """Begin a call; the future's result raises what it raised, or a UsageError if the process has ended."""
+        return self._calls.submit(self._call, function, *arguments)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        with self._remote:
+            self._remote.end()  # which ends a call that is waited for
+            self._calls.shutdown(cancel_futures=True)
+
+    def _call(self, function: Callable[..., Any], *arguments: object) -> Any:
+        self._remote.send((function, arguments))
+        return self._remote.receive()
+
+
+def main() -> None:
+    """What the other process does, until nobody listens any more."""
+    connection = connection_to_parent()
+    os.nice(NICE)
+    import reconstruction.mapping.mapper  # noqa: F401 (takes its time: before the first call)
+
+    serve(connection, lambda message: message[0](*message[1]))
+
+
+if __name__ == "__main__":
+    main()

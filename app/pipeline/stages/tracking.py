@@ -1,0 +1,160 @@
+"""The stage that reads the source and follows points in it."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import cast, get_args
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from app.arrays import Array, Image
+from app.options.run import Run
+from reconstruction.camera import Camera
+from reconstruction.settings import RecoveredRestShape
+from tracking import TrackingError
+from tracking.features import detect_corners
+from tracking.guarded import Guarded, GuardedTracker
+from tracking.region import region_mask
+from tracking.video import Frame, Video
+
+LAG = 2  # frames between a frame and the first one whose tracking may know its shape: so many are on the way
+RECOVERED = get_args(RecoveredRestShape)  # rest shapes that come from the first frames
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What is known of the source before its first frame.
+
+    Attributes:
+        size: (width, height) px.
+        fps: announced rate.
+        frame_count: announced number of frames, if any.
+    """
+
+    size: tuple[int, int]
+    fps: float
+    frame_count: int | None
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What to follow in the next frame.
+
+    Attributes:
+        expected_px: for each object, by its number, where its points are expected (P, 2); None where nobody knows. One that
+            was not asked for before begins in that frame.
+    """
+
+    expected_px: Mapping[int, Array | None]
+
+
+@dataclass(frozen=True)
+class Begun:
+    """An object begins: its points (P, 2) px."""
+
+    points_px: Array
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a frame shows.
+
+    Attributes:
+        number: of the frame, counted from 0.
+        index: its number in the source.
+        time_s: its time there.
+        objects: the points of each object asked for; an error where none can begin.
+        told: what the source has to tell, in words.
+        stage_ms: milliseconds it took.
+    """
+
+    number: int
+    index: int
+    time_s: float
+    objects: Mapping[int, Begun | Guarded | TrackingError]
+    told: tuple[str, ...]
+    stage_ms: Mapping[str, float]
+
+
+class TrackingStage:
+    """From what is asked to what is seen, frame by frame.
+
+    Args:
+        config: source, region and number of points.
+        keep: takes each picture, with the frame's number, before anybody is told of it.
+
+    Raises:
+        TrackingError: the source cannot be read.
+    """
+
+    def __init__(self, config: Run, keep: Callable[[int, Image], None]) -> None:
+        self._config, self._keep = config, keep
+        self._told: list[str] = []
+        self.video = Video(
+            config.source,
+            *config.frame_range,
+            duration_s=config.duration,
+            drop_late=config.drop_late,
+            log=self._told.append,
+        )
+        self._frames: Iterator[Frame] | None = None
+        self._trackers: dict[int, GuardedTracker] = {}
+        self._number = 0
+
+    @property
+    def opened(self) -> Opened:
+        """What is known before the first frame."""
+        return Opened(self.video.size, self.video.fps, self.video.frame_count)
+
+    def next(self, asked: Asked) -> Seen | None:
+        """The next frame; None at the end of the source.
+
+        Raises:
+            UsageError, TrackingError: the source breaks off, or a region, mask or mesh does not fit the picture.
+        """
+        if self._frames is None:
+            self._frames = iter(self.video)
+        began = perf_counter()
+        frame = next(self._frames, None)
+        if frame is None:
+            return None
+        self._keep(self._number, frame.image)
+        decoded = perf_counter()
+        self._trackers = {one: tracker for one, tracker in self._trackers.items() if one in asked.expected_px}
+        objects = {one: self._object(one, frame, expected_px) for one, expected_px in asked.expected_px.items()}
+        tracked = perf_counter()
+        told = tuple(self._told)
+        del self._told[: len(told)]  # another thread may be adding
+        milliseconds = {"decode": 1e3 * (decoded - began), "track": 1e3 * (tracked - decoded)}
+        self._number += 1
+        return Seen(self._number - 1, frame.index, frame.time_s, objects, told, milliseconds)
+
+    def _object(self, one: int, frame: Frame, expected_px: Array | None) -> Begun | Guarded | TrackingError:
+        if one in self._trackers:
+            return self._trackers[one].track(frame.image, expected_px)
+        try:
+            points_px = first_points(self._config, frame.image)
+        except TrackingError as error:
+            return error
+        self._trackers[one] = GuardedTracker(frame.image, points_px)
+        return Begun(points_px)
+
+
+def first_points(config: Run, image: Image) -> Array:
+    """The points (P, 2) px of an object that begins in a picture.
+
+    Raises:
+        UsageError, TrackingError: a region, mask or mesh that does not fit the picture, or too few corners.
+    """
+    height, width = image.shape[:2]
+    region = region_mask((width, height), config.roi, config.mask)
+    gray = cast(NDArray[np.uint8], cv2.cvtColor(image, cv2.COLOR_BGR2GRAY))
+    points_px = detect_corners(gray, region, config.points)
+    if config.rest_shape in RECOVERED:
+        return points_px
+    from app.files.mesh_file import rest_of_surface  # trimesh takes its time to load
+
+    return points_px[rest_of_surface(Path(config.rest_shape), points_px, Camera())[1]]

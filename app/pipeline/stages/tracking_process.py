@@ -1,0 +1,126 @@
+"""Where the tracking stage runs: in a process of its own, or in the run's."""
+
+from collections import deque
+from types import TracebackType
+from typing import Protocol, Self
+
+import cv2
+import numpy as np
+
+from app.arrays import Image
+from app.child import Remote, connection_to_parent, inherited_file, serve
+from app.options.run import Run
+from app.pipeline.stages.ring import Ring
+from app.pipeline.stages.tracking import Asked, Opened, Seen, TrackingStage
+
+
+class Tracking(Protocol):
+    """The stage, wherever it is: messages go in, answers come back in their order."""
+
+    opened: Opened
+
+    def send(self, asked: Asked) -> None:
+        """Ask for another frame."""
+
+    def receive(self) -> Seen | None:
+        """What the oldest frame asked for shows; None at the end of the source."""
+
+    def picture(self, number: int, *, keep: bool) -> Image:
+        """The picture of the frame received last; one not to keep changes later."""
+
+
+class TrackingHere:
+    """The stage in this process; a context manager that closes the source.
+
+    Args:
+        config: as for `TrackingStage`.
+    """
+
+    def __init__(self, config: Run) -> None:
+        self._picture: Image = np.empty((0, 0, 3), np.uint8)
+        self._stage = TrackingStage(config, self._kept)
+        self._waiting: deque[Asked] = deque()
+        self.opened = self._stage.opened
+
+    def send(self, asked: Asked) -> None:
+        """It waits until the answer is wanted."""
+        self._waiting.append(asked)
+
+    def receive(self) -> Seen | None:
+        """Find it out."""
+        return self._stage.next(self._waiting.popleft())
+
+    def picture(self, number: int, *, keep: bool) -> Image:  # noqa: ARG002
+        """The frame's own."""
+        return self._picture
+
+    def _kept(self, number: int, picture: Image) -> None:  # noqa: ARG002
+        self._picture = picture
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._stage.video.close()
+
+
+class TrackingProcess:
+    """The stage in a process of its own; a context manager that ends it.
+
+    Args:
+        config: as for `TrackingStage`.
+        pictures: the `shared_file` that it writes pictures to.
+    """
+
+    def __init__(self, config: Run, pictures: int) -> None:
+        self._remote = Remote("app.pipeline.stages.tracking_process", "follows the points", pictures)
+        try:
+            self._remote.send(config)
+            self.opened: Opened = self._remote.receive()
+            self.ring = Ring(pictures, self.opened.size)
+        except BaseException:
+            self._remote.__exit__(None, None, None)
+            raise
+
+    def send(self, asked: Asked) -> None:
+        """Ask for another frame."""
+        self._remote.send(asked)
+
+    def receive(self) -> Seen | None:
+        """What the oldest frame asked for shows."""
+        seen: Seen | None = self._remote.receive()
+        return seen
+
+    def picture(self, number: int, *, keep: bool) -> Image:
+        """The one in the ring, or a copy."""
+        picture = self.ring.picture(number)
+        return picture.copy() if keep else picture
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._remote.__exit__(kind, error, trace)
+
+
+def main() -> None:
+    """What the process does: it opens the source, then it answers what is asked, until nobody listens any more."""
+    cv2.setNumThreads(1)
+    connection, pictures = connection_to_parent(), inherited_file(2)
+    stage: TrackingStage | None = None
+
+    def answer(message: Run | Asked) -> Opened | Seen | None:
+        nonlocal stage
+        if isinstance(message, Run):
+            ring: list[Ring] = []
+            stage = TrackingStage(message, lambda number, image: ring[0].write(number, image))
+            ring.append(Ring(pictures, stage.video.size))
+            return stage.opened
+        assert stage is not None
+        return stage.next(message)
+
+    serve(connection, answer)
+
+
+if __name__ == "__main__":
+    main()
