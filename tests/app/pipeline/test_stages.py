@@ -32,7 +32,7 @@ class Killing(Progress):
 
     def __init__(self, stage: str) -> None:
         super().__init__()
-        self.stage, self.left = stage, 30
+        self.stage, self.left = stage, 5 if stage == "maps" else 30  # when it is needed again
 
     def advance(self, phase: str, error_px: float | None = None) -> None:
         super().advance(phase, error_px)
@@ -75,10 +75,12 @@ def test_a_killed_stage_ends_the_run_with_everything_kept(videos: Path, stage: s
     session = Session(config(videos), Killing(stage))
     with pytest.raises(UsageError, match=f"the process that {does} has ended"):
         session.run()
-    with np.load("tracks.npz") as tracks, np.load("shapes.npz") as shapes:
-        assert len(tracks["W"]) >= 30
-        assert len(shapes["S"]) >= 20
-    if stage != "recording":
+    with np.load("tracks.npz") as tracks:
+        assert len(tracks["W"]) >= (5 if stage == "maps" else 30)
+    if stage != "maps":
+        with np.load("shapes.npz") as shapes:
+            assert len(shapes["S"]) >= 30
+    if stage == "tracking":
         assert Playback.load(Path("run.rrd")).shaped.sum() >= 20
     allowed = {"run.rrd", "tracks.npz", "shapes.npz"}
     assert {path.name for path in Path().iterdir()} <= allowed
