@@ -17,6 +17,7 @@ from reconstruction.settings import Metric
 from reconstruction.state import State
 
 COARSE_VERTICES = 60
+TURNS = 3  # of pose and Λ, each with the other known
 STAYS = 0.02  # pull of Λ to the frame before, against 1 of a mode that shows in all points
 
 
@@ -92,15 +93,17 @@ class Model:
         """
         B = self.B if seen.all() else self.B[:, seen]
         gram, said = B @ B.T, shape[:, seen] @ B.T / self.radius
-        shown, modes = gram[-1, -1], slice(3, -1)
-        before = np.zeros((3, len(gram) - 4)) if last is None else last.Lambda[-1]
-        model = np.concatenate([np.eye(3), before, np.zeros((3, 1))], axis=1)  # times B: the shape of the frame before
-        middle, centre = said[:, -1:] / shown, model @ gram[:, -1:] / shown
-        R = nearest_rotation(said @ model.T - shown * middle @ centre.T)
-        origin = middle - R @ centre
+        modes, r, shown = slice(3, -1), len(B) - 4, gram[-1, -1]
         pull = STAYS * self.B.shape[1]
-        wanted = R.T @ (said - origin * gram[-1])[:, modes] - gram[:3, modes] + pull * before
-        Lambda = np.linalg.solve(gram[modes, modes] + pull * np.eye(len(gram) - 4), wanted.T).T
+        before = np.zeros((3, r)) if last is None else last.Lambda[-1]
+        Lambda, middle = np.zeros((3, r)), said[:, -1:] / shown
+        for _ in range(TURNS):
+            model = np.concatenate([np.eye(3), Lambda, np.zeros((3, 1))], axis=1)  # times B: the shape by now
+            centre = model @ gram[:, -1:] / shown
+            R = nearest_rotation(said @ model.T - shown * middle @ centre.T)
+            origin = middle - R @ centre
+            wanted = R.T @ (said - origin * gram[-1])[:, modes] - gram[:3, modes] + pull * before
+            Lambda = np.linalg.solve(gram[modes, modes] + pull * np.eye(r), wanted.T).T
         s = focal_px / (self.scale * self.radius * origin[2, 0])
         return State(quaternion_from_rotation(R)[None], s * origin[:2].T, np.log([s]), Lambda[None])
 

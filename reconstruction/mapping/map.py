@@ -58,7 +58,7 @@ class Map:
         """
         if self.sheet is None or visible.sum() < FEWEST_POINTS:
             return None
-        found = self.sheet.finish(np.where(visible, W, 0.0)[None], visible[None]).shapes()[0]
+        found = self.sheet.shape_in(np.where(visible, W, 0.0), visible)
         shape = self.unit_px * completed(found, self.rest.motion.shape)
         if last is not None and not self.camera.perspective:
             depth, before = shape[2] - shape[2].mean(), (last.matrices()[-1] @ model.B)[2]

@@ -6,10 +6,12 @@ import numpy as np
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
-from reconstruction.mapping.isometric.lengths import best_start, usual
+from reconstruction.mapping.isometric.lengths import Edges, best_start, usual
 from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_in, rays_of
 from reconstruction.mapping.isometric.smooth_field import SmoothField
-from reconstruction.mapping.isometric.warps import Warps
+from reconstruction.mapping.isometric.warps import Warps, quick_fit
+
+QUICK_STEPS = 4
 
 
 @dataclass(frozen=True)
@@ -61,14 +63,22 @@ class IsometricSheet:
 
         Each starts from the two keyframes that look most alike; the better end is kept.
         """
-        return self.in_frames(self.warps.fit(W, visible), steps)
-
-    def in_frames(self, warps: Warps, steps: int = 6) -> "IsometricSheet":
-        """The same for images already made smooth."""
+        warps = self.warps.fit(W, visible)
         nodes = nodes_in(warps, self.nodes)
+        c, edges = self._depths(nodes, steps)
+        off = edges.log_lengths(c) - self.log_lengths
+        return replace(self, warps=warps, nodes=nodes, coefficients=c, strain=edges.rms(off), change=usual(off))
+
+    def shape_in(self, W: Array, visible: Mask) -> Array:
+        """The shape (3, p) in one more frame W (2, p) px, visible (p,): `finish` to 0.2 %, in half the time."""
+        points = self.nodes.points
+        image, variance = quick_fit(self.warps, W, visible, points)
+        c, _ = self._depths(replace(self.nodes, images=image[None, :, points], variance=variance[None]), QUICK_STEPS)
+        return np.asarray(np.exp(c @ self.values.T) * rays_of(image[None], self.camera)[0])
+
+    def _depths(self, nodes: Nodes, steps: int) -> tuple[Array, Edges]:
+        """Coefficients (F, r) of log depths with which nodes keep their lengths in their images, and their edges."""
         edges = edges_between(nodes, self.values, self.camera).weighted(self.edge_weights)
         alike = nearest(nodes.images, self.nodes.images)[:, :2]
         starts = list(self.coefficients[alike].swapaxes(0, 1))
-        c = best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, steps)
-        off = edges.log_lengths(c) - self.log_lengths
-        return replace(self, warps=warps, nodes=nodes, coefficients=c, strain=edges.rms(off), change=usual(off))
+        return best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, steps), edges

@@ -160,14 +160,47 @@ def robust_fit(
         for _ in range(sweeps):
             done += 1
             firm = max(firmness, 10.0**-done)
-            weighted = Bs.T * (h / h.sum())
-            gram = weighted @ Bs
-            gram[np.diag_indices(len(gram))] += firm * stiffness[:r] + 1e-12
-            c = np.linalg.solve(gram, weighted @ ws)
+            c, _ = weighted_fit(Bs, ws, h, firm * stiffness[:r])
             h, off, usual = weights_of(ws - Bs @ c, finest)
     weights, inlier = np.zeros(len(B)), np.zeros(len(B), bool)
     weights[every], inlier[every] = h, off < GROSS * usual
     return c, weights, inlier, usual
+
+
+def quick_fit(warps: Warps, w: Array, visible: Mask, points: Indices) -> tuple[Array, Array]:
+    """One more image w (2, p) px made smooth: as `robust_fit` does, but all points come in by one last step only.
+
+    Its normal matrix is that of the few, which are spread as all are.
+
+    Returns:
+        (2, p) px of all points, variance (n,) px² of a coordinate of some of them.
+    """
+    B, stiffness, every = warps.values, warps.field.stiffness, np.flatnonzero(visible & warps.placed)
+    some = spread_rows(visible & warps.placed, warps.few)
+    few, target, h = B[some], w[:, some].T, np.ones(len(some))
+    finest = FINEST * float(np.sqrt(np.var(target, axis=0).sum()))
+    rough = few[:, :FEW_FUNCTIONS]
+    for sweep in range(ROUGH_SWEEPS):
+        c, _ = weighted_fit(rough, target, h, 0.1 ** (sweep + 1) * stiffness[:FEW_FUNCTIONS])
+        h, _, _ = weights_of(target - rough @ c, finest)
+    held = warps.firmness * stiffness
+    c, gram = weighted_fit(few, target, h, held)
+    inverse = np.linalg.inv(gram)
+    left = w.T - B @ c
+    h, _, usual = weights_of(left[every], finest)
+    pull = np.zeros_like(left)
+    pull[every] = h[:, None] / h.sum() * left[every]
+    c += inverse @ (B.T @ pull - held[:, None] * c)
+    at = B[points]
+    return (B @ c).T, usual**2 / h.sum() * ((at @ inverse) * at).sum(axis=1)
+
+
+def weighted_fit(B: Array, target: Array, h: Array, held: Array) -> tuple[Array, Array]:
+    """Coefficients (r, 2) of functions B (n, r) through a target (n, 2) weighted by h, held back; and the normal matrix."""
+    weighted = B.T * (h / h.sum())
+    gram = weighted @ B
+    gram[np.diag_indices(len(gram))] += held + 1e-12
+    return np.linalg.solve(gram, weighted @ target), gram
 
 
 def weights_of(residual: Array, finest: float) -> tuple[Array, Array, float]:

@@ -59,6 +59,14 @@ def test_frames_that_were_no_keyframes_are_finished_with_the_lengths_known() -> 
     assert error(rest, S[1::2]) < 0.05
 
 
+def test_the_quick_shape_of_a_frame_is_that_of_finishing() -> None:
+    W, _, _ = waving()
+    found = sheet(W[::2], SEEN[::2], CAMERA)
+    finished = found.finish(W[1::2], SEEN[1::2]).shapes()
+    quick = np.stack([found.shape_in(w, h) for w, h in zip(W[1::2], SEEN[1::2], strict=True)])
+    assert np.median(e3d(quick, finished)) < 0.01
+
+
 def test_gaps_and_gross_errors_are_lived_with() -> None:
     rng = np.random.default_rng(3)
     W, S = waving_sheet(rng, frames=20, points=250, noise_px=0.5)
