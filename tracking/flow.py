@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking import Array, Flags, Image, Indices
 
-WINDOW_PX = 15
+WINDOW_PX = 11
 # The guides find the motion, the others only refine it. With all points on all levels, 21 % of kinect_paper's
 # fail between frames 60 and 61 (its texture repeats), in 20 ms; led by guides, none, in 8 ms (one core). Guides are
 # followed in the half picture, which is as good a guide at a quarter of the cost. Dense flow (DIS, ultrafast) as the guide
@@ -17,6 +17,7 @@ GUIDES = 150
 GUIDE_WINDOW_PX = 11  # of the half picture
 GUIDE_LEVELS = 3  # halvings of a half picture 320 px wide
 NEAREST_GUIDES = 8  # guides whose median motion a point starts from
+GUESSED_PX = 1.0  # what ends so near to where its guides went needs not come back
 RETURN_PX = 1.0  # forward and backward again must end so near to the start
 CONVERGED_PX, RETURN_CONVERGED_PX = 0.03, 0.1  # shorter steps end the search; alignment to appearance follows
 MOST_STEPS = 30
@@ -52,64 +53,81 @@ def spread_order(points_px: Array) -> Indices:
     return order
 
 
-def follow(before: Grays, now: Grays, points_px: Array) -> Array:
-    """Where points went from one picture to the next: (n, 2), NaN where they did not come back.
+class Flow:
+    """Where the points of a reference frame go from one picture to the next, led by the motion of a few guides among them.
 
     Args:
-        before: a picture.
-        now: the picture after it, of the same size.
-        points_px: (n, 2) points in the first, in `spread_order`: the first `GUIDES` lead.
+        reference_px: (P, 2) the points in the reference frame.
     """
-    if len(points_px) == 0:  # OpenCV raises
-        return np.empty((0, 2))
-    guides = points_px[:GUIDES]
-    levels = GUIDE_LEVELS + max(0, round(np.log2(max(now.half.shape) / 320.0)))
-    moved, good = both_ways(before.half, now.half, guides / 2, np.zeros_like(guides), GUIDE_WINDOW_PX, levels)
-    motion = (2 * moved - guides)[good]
-    if len(motion) < NEAREST_GUIDES:
-        guess = np.zeros_like(points_px)
-        levels += 1
-    else:
-        guess = _median_of_nearest(points_px, guides[good], motion)
-        levels = 0
-    there, good = both_ways(before.full, now.full, points_px, guess, WINDOW_PX, levels)
-    there[~good] = np.nan
-    return there
+
+    def __init__(self, reference_px: Array) -> None:
+        self._reference = reference_px.astype(np.float32)
+        self._order = spread_order(reference_px)
+        self._guides: Indices = np.empty(0, np.int64)
+        self._nearest: Indices = np.empty((len(reference_px), 0), np.int64)  # guides to each point, in the reference frame
+
+    def follow(self, before: Grays, now: Grays, points_px: Array) -> Array:
+        """Where points (P, 2) went from one picture to the next of the same size; NaN stays, and where there is none."""
+        moved = np.full_like(points_px, np.nan)
+        seen = np.flatnonzero(np.isfinite(points_px[:, 0]))
+        if len(seen) == 0:  # OpenCV raises
+            return moved
+        levels = GUIDE_LEVELS + max(0, round(np.log2(max(now.half.shape) / 320.0)))
+        motion = self._guess(before, now, points_px, levels)[seen]
+        if np.isfinite(motion[0, 0]):
+            levels = 0
+        else:
+            motion, levels = np.zeros_like(motion), levels + 1
+        start = points_px[seen]
+        there, good = lucas_kanade(before.full, now.full, start, motion, WINDOW_PX, levels, CONVERGED_PX)
+        far = np.flatnonzero(np.linalg.norm(there - start - motion, axis=1) > GUESSED_PX)
+        good[far] &= returned(before.full, now.full, start[far], there[far], motion[far], WINDOW_PX, levels)
+        moved[seen[good]] = there[good]
+        return moved
+
+    def _guess(self, before: Grays, now: Grays, points_px: Array, levels: int) -> Array:
+        """The median motion of the guides nearest to each point in the reference frame: (P, 2); NaN if they are few."""
+        guides = self._order[np.isfinite(points_px[self._order, 0])][:GUIDES]
+        start = points_px[guides] / 2
+        still = np.zeros_like(start)
+        moved, found = lucas_kanade(before.half, now.half, start, still, GUIDE_WINDOW_PX, levels, CONVERGED_PX)
+        good = found & returned(before.half, now.half, start, moved, still, GUIDE_WINDOW_PX, levels)
+        guides, motion = guides[good], 2 * (moved - start)[good]
+        if len(guides) < NEAREST_GUIDES:
+            return np.full_like(points_px, np.nan)
+        if not np.array_equal(guides, self._guides):  # seldom
+            nearest = cv2.batchDistance(
+                self._reference, self._reference[guides], cv2.CV_32F, normType=cv2.NORM_L2SQR, K=NEAREST_GUIDES
+            )[1]
+            self._guides, self._nearest = guides, np.asarray(nearest, np.int64)
+        middle = slice(NEAREST_GUIDES // 2 - 1, NEAREST_GUIDES // 2 + 1)
+        return cast(Array, np.sort(motion.T[:, self._nearest], axis=2)[:, :, middle].mean(axis=2).T)
 
 
-def both_ways(before: Image, now: Image, points: Array, guess: Array, window: int, levels: int) -> tuple[Array, Flags]:
-    """Points (n, 2) by Lucas-Kanade from guesses of their motion (n, 2), and whether they come back to where they were."""
+def lucas_kanade(
+    before: Image, now: Image, points: Array, motion: Array, window: int, levels: int, converged_px: float
+) -> tuple[Array, Flags]:
+    """Where points (n, 2) went, from guesses of their motion (n, 2), and whether that is known (n,)."""
     start = points.astype(np.float32)
-    motion = guess.astype(np.float32)
-    size, guessed = (window, window), cv2.OPTFLOW_USE_INITIAL_FLOW
-    until = cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS
     there, found, _ = cv2.calcOpticalFlowPyrLK(
         before,
         now,
         start,
-        start + motion,
-        winSize=size,
+        start + motion.astype(np.float32),
+        winSize=(window, window),
         maxLevel=levels,
-        flags=guessed,
-        criteria=(until, MOST_STEPS, CONVERGED_PX),
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        criteria=(cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, MOST_STEPS, converged_px),
     )
-    back, returned, _ = cv2.calcOpticalFlowPyrLK(
-        now,
-        before,
-        there,
-        there - motion,
-        winSize=size,
-        maxLevel=levels,
-        flags=guessed,
-        criteria=(until, MOST_STEPS, RETURN_CONVERGED_PX),
-    )
-    good = (found[:, 0] > 0) & (returned[:, 0] > 0) & (np.linalg.norm(back - start, axis=1) < RETURN_PX)
-    return np.asarray(there, np.float64), np.asarray(good, np.bool_)
+    return np.asarray(there, np.float64), np.asarray(found[:, 0] > 0, np.bool_)
 
 
-def _median_of_nearest(points: Array, guides: Array, motion: Array) -> Array:
-    near, far = guides.astype(np.float32), points.astype(np.float32)
-    nearest = cv2.batchDistance(far, near, cv2.CV_32F, normType=cv2.NORM_L2SQR, K=NEAREST_GUIDES)[1]
-    return cast(
-        Array, np.sort(motion.T[:, nearest], axis=2)[:, :, NEAREST_GUIDES // 2 - 1 : NEAREST_GUIDES // 2 + 1].mean(axis=2).T
-    )
+def returned(before: Image, now: Image, points: Array, moved: Array, motion: Array, window: int, levels: int) -> Flags:
+    """Whether points (n, 2) come back from where they went (n, 2).
+
+    The guess of their motion (n, 2) is the same as for the way there: from what was found, they always would.
+    """
+    if len(points) == 0:
+        return np.zeros(0, np.bool_)
+    back, found = lucas_kanade(now, before, moved, -motion, window, levels, RETURN_CONVERGED_PX)
+    return found & (np.linalg.norm(back - points, axis=1) < RETURN_PX)

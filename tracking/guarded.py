@@ -79,11 +79,6 @@ class GuardedTracker:
         self.lost = False
         self.frames_lost = 0
 
-    def begin(self, image_bgr: Image) -> None:
-        """Begin with the next frame, as `PointTracker.begin` does; a lost surface is not followed."""
-        if not self.lost:
-            self._tracker.begin(image_bgr)
-
     def track(self, image_bgr: Image, predicted_px: Array | None = None) -> Guarded:
         """Find the points in the next frame; `predicted_px` (P, 2) as for `PointTracker.track`."""
         if self.lost:

@@ -7,7 +7,7 @@ import numpy as np
 from tracking import Array, Flags, Floats, Image, Indices
 from tracking.appearance import Appearance
 from tracking.consistency import MIN_SUPPORT, LocalMotion, Surroundings
-from tracking.flow import Grays, follow, spread_order
+from tracking.flow import Flow, Grays
 
 PATCH_RADIUS = 7
 BORDER_PX = 4.0  # nearer to the border a point counts as having left
@@ -39,17 +39,6 @@ class Observation:
     visible: Flags
 
 
-@dataclass(frozen=True)
-class _Begun:
-    """What is computed of a frame before there is a prediction: its picture, gray, the flow to it, fine and coarse."""
-
-    image: Image
-    grays: Grays
-    points: Array
-    fine: Floats
-    coarse: Floats
-
-
 class PointTracker:
     """Follows points of a reference frame from frame to frame.
 
@@ -61,19 +50,13 @@ class PointTracker:
     def __init__(self, image_bgr: Image, points_px: Array) -> None:
         self._grays = Grays.of(image_bgr)
         self._reference = points_px.astype(np.float64)
-        self._order = spread_order(self._reference)
+        self._flow = Flow(self._reference)
         self._surroundings = Surroundings(self._reference)
         fine, coarse = _pictures(self._grays)
         self._fine = Appearance(fine, self._reference, PATCH_RADIUS)
         self._coarse = Appearance(coarse, self._reference / 2.0, PATCH_RADIUS)
         self._points = self._reference.copy()
         self._affine = np.broadcast_to(np.eye(2), (len(points_px), 2, 2)).copy()
-        self._begun: _Begun | None = None
-
-    def begin(self, image_bgr: Image) -> None:
-        """Do what `track` can do of the next frame before there is a prediction: most of its work, in another thread."""
-        grays = Grays.of(image_bgr)
-        self._begun = _Begun(image_bgr, grays, self._flow(grays), *_pictures(grays))
 
     def track(self, image_bgr: Image, predicted_px: Array | None = None) -> Observation:
         """Find the points in the next frame.
@@ -83,18 +66,15 @@ class PointTracker:
             predicted_px: (P, 2) where the model expects the points, NaN where it does not know; lost points
                 are taken up again near there. None while there is no model: lost points stay lost.
         """
-        if self._begun is None or self._begun.image is not image_bgr:
-            self.begin(image_bgr)
-        assert self._begun is not None
-        begun, self._begun = self._begun, None
-        self._grays, points, fine, coarse = begun.grays, begun.points, begun.fine, begun.coarse
+        grays = Grays.of(image_bgr)
+        fine, coarse = _pictures(grays)
+        points = self._flow.follow(self._grays, grays, self._points)
         motion = self._motion(points, predicted_px)
         points[~motion.consistent] = np.nan
         points = self._refine(fine, coarse, points, motion)
         points = self._retrieve(fine, coarse, points, self._expected(points, motion, predicted_px), motion)
         points[~_inside(points, fine.shape)] = np.nan
-        self._points = points
-        self._affine = motion.affine
+        self._grays, self._points, self._affine = grays, points, motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
 
     def resume(self, image_bgr: Image, expected_px: Array) -> Observation:
@@ -104,7 +84,7 @@ class PointTracker:
             image_bgr: (H, W, 3) uint8, of the reference frame's size.
             expected_px: (P, 2) where the points are, to some pixels; NaN where that is not known.
         """
-        self._grays, self._begun = Grays.of(image_bgr), None
+        self._grays = Grays.of(image_bgr)
         fine, coarse = _pictures(self._grays)
         points = np.full_like(self._reference, np.nan)
         for _ in range(RESUME_ROUNDS):  # what is found tells better where the others are
@@ -115,13 +95,6 @@ class PointTracker:
         points[~_inside(points, fine.shape)] = np.nan
         self._points, self._affine = points, motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
-
-    def _flow(self, grays: Grays) -> Array:
-        """The points seen in the last frame, by optical flow: (P, 2), NaN where lost."""
-        points = np.full_like(self._points, np.nan)
-        seen = self._order[np.isfinite(self._points[self._order, 0])]
-        points[seen] = follow(self._grays, grays, self._points[seen])
-        return points
 
     def _motion(self, points: Array, predicted_px: Array | None) -> LocalMotion:
         weight = np.isfinite(points[:, 0]).astype(np.float64)

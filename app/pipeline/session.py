@@ -15,7 +15,7 @@ from app.options.run import Run
 from app.pipeline.final_pass import final_pass
 from app.pipeline.processed import InOrder, Processed, Surface
 from app.pipeline.stages.stages import Stages
-from app.pipeline.stages.tracking import LAG, Asked, Begun, Seen
+from app.pipeline.stages.tracking import LAG, Asked, Seen
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import Successor, options_for_another
 from app.pipeline.summary import Counts, RunSummary, summary_of
@@ -93,12 +93,8 @@ class Session:
 
     def _begun(self, seen: Seen) -> TrackedObject:
         """The first object. Raises the error if there is none."""
-        points = seen.objects[0]
-        if isinstance(points, TrackingError):
-            raise points
-        assert isinstance(points, Begun)
         first = Frame(seen.index, seen.time_s, self._tracking.picture(seen.number, keep=True))
-        return TrackedObject(self._config, 0, first, points.points_px, self._watch, self._begin_map)
+        return TrackedObject(self._config, 0, first, seen.begun(0).points_px, self._watch, self._begin_map)
 
     def _objects(self, source: Iterator[Seen]) -> Iterator[Processed]:
         """The frames of one object after another."""
@@ -124,9 +120,7 @@ class Session:
     def _process(self, seen: Seen) -> None:
         """Make shapes of a frame's points, record what is known, and ask for another frame."""
         tracked = self._object
-        points = seen.objects[tracked.number]
-        assert not isinstance(points, TrackingError)
-        guarded = tracked.follow(points)
+        guarded = tracked.follow(seen.points(tracked.number))
         image = self._tracking.picture(seen.number, keep=self._order.wanted)
         frame = Frame(seen.index, seen.time_s, image)
         self._tell_changes(seen, guarded)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
 import numpy as np
 
-from app.child import child, connection_to_parent, inherited_file
-from app.pipeline.stages.ring import Ring
+from app.processes.child import child, connection_to_parent, inherited_file
+from app.processes.ring import Ring
 from app.terminal.errors import UsageError
 from tracking.video import Frame
 

@@ -26,7 +26,7 @@ def here(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 def quick_to_start(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """Our processes are forked, except where they are what is tested."""
     if "recording" not in str(request.path.relative_to(Path(__file__).parent)):
-        monkeypatch.setattr("app.child.started", forked.started)
+        monkeypatch.setattr("app.processes.child.started", forked.started)
 
 
 @pytest.fixture

@@ -52,7 +52,7 @@ def loaded() -> socket.socket:
 
 
 def started(module: str, *files: int) -> Forked:
-    """In place of `app.child.started`."""
+    """In place of `app.processes.child.started`."""
     lifeline, theirs = os.pipe()
     socket.send_fds(loaded(), [f"{module} {Path.cwd()}".encode()], [theirs, 2, *files])
     os.close(theirs)

@@ -6,30 +6,31 @@ from hypothesis import strategies as st
 
 from tests.tracking.scene import SIZE, moved, texture
 from tracking.features import detect_corners
-from tracking.flow import Grays, follow, spread_order
+from tracking.flow import Flow, Grays, spread_order
 from tracking.region import region_mask
 
 BEFORE = Grays.of(texture())
 POINTS = detect_corners(BEFORE.full, region_mask(SIZE, (60, 60, 200, 120)), 300)
-POINTS = POINTS[spread_order(POINTS)]
+FLOW = Flow(POINTS)
 
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(-15, 15), st.floats(-15, 15))
 def test_follows_a_shift(dx: float, dy: float) -> None:
     now = moved(BEFORE.full[..., None].repeat(3, axis=2), lambda p: p - [dx, dy])
-    error = np.linalg.norm(follow(BEFORE, Grays.of(now), POINTS) - POINTS - [dx, dy], axis=1)
+    error = np.linalg.norm(FLOW.follow(BEFORE, Grays.of(now), POINTS) - POINTS - [dx, dy], axis=1)
     assert np.mean(error < 0.2) > 0.9
 
 
 def test_points_of_a_picture_that_is_gone_do_not_come_back() -> None:
-    there = follow(BEFORE, Grays.of(texture(seed=1)), POINTS)
+    there = FLOW.follow(BEFORE, Grays.of(texture(seed=1)), POINTS)
     assert np.isnan(there[:, 0]).mean() > 0.7
 
 
 def test_no_points_and_few_points() -> None:
-    assert follow(BEFORE, BEFORE, np.empty((0, 2))).shape == (0, 2)
-    np.testing.assert_allclose(follow(BEFORE, BEFORE, POINTS[:3]), POINTS[:3], atol=0.01)
+    assert np.isnan(FLOW.follow(BEFORE, BEFORE, np.full_like(POINTS, np.nan))).all()
+    few = np.where(np.arange(len(POINTS))[:, None] < 3, POINTS, np.nan)
+    np.testing.assert_allclose(FLOW.follow(BEFORE, BEFORE, few), few, atol=0.01)
 
 
 @given(st.integers(1, 60), st.integers(0, 2**32 - 1))

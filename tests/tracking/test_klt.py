@@ -194,20 +194,3 @@ def test_the_paper_is_followed_without_a_model(shared_data: Path) -> None:
         error = np.linalg.norm(seen[f].points_px - expected, axis=1)[both]
         assert np.median(error) < 0.6, f
         assert np.percentile(error, 90) < 1.2, f
-
-
-def test_a_frame_begun_before_is_tracked_alike() -> None:
-    plain, ahead = PointTracker(IMAGE, POINTS), PointTracker(IMAGE, POINTS)
-    for i, k in enumerate(STEPS[:6]):
-        image, truth = scene(k)
-        if i == 2:
-            ahead.begin(IMAGE)  # of another frame than the one that comes: no use
-        elif i != 4:
-            ahead.begin(image)
-        one, two = plain.track(image, truth), ahead.track(image, truth)
-        np.testing.assert_array_equal(one.points_px, two.points_px)
-    plain.resume(scene(STEPS[7])[0], truth)
-    ahead.begin(scene(STEPS[7])[0])
-    ahead.resume(scene(STEPS[7])[0], truth)
-    image = scene(STEPS[8])[0]
-    np.testing.assert_array_equal(plain.track(image).points_px, ahead.track(image).points_px)

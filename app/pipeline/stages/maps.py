@@ -6,7 +6,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, Self
 
-from app.child import Remote, connection_to_parent, serve
+from app.processes.child import connection_to_parent
+from app.processes.remote import Remote, serve
 
 NICE = 5  # frames go first
 

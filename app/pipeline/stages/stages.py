@@ -7,8 +7,8 @@ from typing import Self
 
 from app.options.run import Run
 from app.pipeline.stages.maps import MapProcess
-from app.pipeline.stages.ring import shared_file
 from app.pipeline.stages.tracking_process import Tracking, TrackingHere, TrackingProcess
+from app.processes.ring import shared_file
 from app.recording.process import RecordingHere, RecordingProcess
 from reconstruction.mapping.mapper import Start, at_once
 

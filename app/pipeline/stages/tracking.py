@@ -78,6 +78,19 @@ class Seen:
     told: tuple[str, ...]
     stage_ms: Mapping[str, float]
 
+    def points(self, number: int) -> "Begun | Guarded":
+        """Those of an object. Raises the error if it cannot begin."""
+        found = self.objects[number]
+        if isinstance(found, TrackingError):
+            raise found
+        return found
+
+    def begun(self, number: int) -> Begun:
+        """Those of an object that begins. Raises the error if it cannot."""
+        found = self.points(number)
+        assert isinstance(found, Begun)
+        return found
+
 
 class TrackingStage:
     """From what is asked to what is seen, frame by frame.

@@ -8,10 +8,11 @@ import cv2
 import numpy as np
 
 from app.arrays import Image
-from app.child import Remote, connection_to_parent, inherited_file, serve
 from app.options.run import Run
-from app.pipeline.stages.ring import Ring
 from app.pipeline.stages.tracking import Asked, Opened, Seen, TrackingStage
+from app.processes.child import connection_to_parent, inherited_file
+from app.processes.remote import Remote, serve
+from app.processes.ring import Ring
 
 
 class Tracking(Protocol):

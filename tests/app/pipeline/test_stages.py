@@ -11,8 +11,8 @@ import pytest
 from app.options.model import Model
 from app.options.run import Output, Run
 from app.pipeline.session import Session
-from app.pipeline.stages.ring import FEWEST, Ring, shared_file
 from app.playback.playback import Playback
+from app.processes.ring import FEWEST, Ring, shared_file
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 

@@ -1,55 +1,14 @@
-"""Processes of our own, each with a connection to the one that began it."""
+"""Functions in processes of their own, over messages and answers."""
 
 import os
-import subprocess
-import sys
 import traceback
 from collections.abc import Callable
-from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any, Self
 
-from app.environment import environment
+from app.processes.child import child
 from app.terminal.errors import UsageError
-
-
-def child(module: str, *files: int) -> tuple["subprocess.Popen[bytes]", Connection]:
-    """A process that runs a module of ours, and the connection to it; `connection_to_parent` is its other end.
-
-    Not one of multiprocessing's: those run the user's own script again.
-
-    Args:
-        module: its name.
-        files: open files that the process gets, too, by their numbers, which are its further arguments.
-    """
-    ours, theirs = Pipe()
-    with theirs:
-        return started(module, theirs.fileno(), *files), ours
-
-
-def started(module: str, *files: int) -> "subprocess.Popen[bytes]":
-    """The process, with open files, by their numbers, which are its arguments."""
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", module, *map(str, files)],  # -P: not the user's modules
-        env=environment() | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-        stdin=subprocess.DEVNULL,
-        stdout=2,  # stderr: stdout is for the summary
-        pass_fds=files,
-        start_new_session=True,  # Ctrl-C ends the run, which then tells what is left to do
-    )
-
-
-def connection_to_parent() -> Connection:
-    """The connection of a process that `child` began."""
-    return Connection(inherited_file(1))
-
-
-def inherited_file(place: int) -> int:
-    """The number of an open file that `started` gave, by its place among the arguments; our own children lack it."""
-    number = int(sys.argv[place])
-    os.set_inheritable(number, False)
-    return number
 
 
 class Remote:
