@@ -54,6 +54,7 @@ class Video:
         live: whether frames come when they happen: a camera, or a stream without end. Their time stamps are
             those of their arrival, from 0.
         size: (width, height) in px.
+        first_index: of its first frame.
         frame_count: announced number of frames that will be delivered, a hint only: containers lie, and
             None where the source does not say (live sources).
         fps: announced rate, a hint only.
@@ -100,6 +101,7 @@ class Video:
             self._capture.release()
             raise
         self._first = frame
+        self.first_index = frame.index
         self.size = (frame.image.shape[1], frame.image.shape[0])
         self.frame_count: int | None = None
         if self._announced is not None:

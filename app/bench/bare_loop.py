@@ -11,7 +11,7 @@ import numpy as np
 from tracking import Array, Image
 from tracking.features import detect_corners
 from tracking.flow import GUIDE_LEVELS, GUIDE_WINDOW_PX, GUIDES, Grays, spread_order
-from tracking.region import region_mask
+from tracking.region.mask import region_mask
 
 WINDOW_PX = 15  # what a tracker needs that has nothing but this to go by
 

@@ -50,6 +50,8 @@ class Source:
     """Video file, image pattern (img%04d.png), camera index or URL."""
     roi: tuple[int, int, int, int] | None = None
     """Region with the surface in the first frame: X Y WIDTH HEIGHT in pixels; without it the whole frame."""
+    search: bool = True
+    """Look for the surface in the region, by what moves together in the first frames; without it, all of it is taken."""
     mask: Path | None = None
     """Picture of the video's size, white where the surface is in the first frame."""
     frames: Annotated[str, tyro.conf.arg(metavar="A:B")] = ":"

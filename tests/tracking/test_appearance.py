@@ -5,7 +5,7 @@ import pytest
 from tests.tracking.scene import SIZE, moved, texture, tilt
 from tracking.appearance import Appearance
 from tracking.features import detect_corners
-from tracking.region import region_mask
+from tracking.region.mask import region_mask
 
 IMAGE = texture()
 POINTS = detect_corners(cv2.cvtColor(IMAGE, cv2.COLOR_BGR2GRAY), region_mask(SIZE, (60, 50, 200, 140)), 150)

@@ -7,7 +7,7 @@ import pytest
 from tests.tracking.scene import SIZE, texture
 from tracking import TrackingError
 from tracking.features import BORDER_PX, MIN_SPACING_PX, detect_corners
-from tracking.region import region_mask
+from tracking.region.mask import region_mask
 
 WHOLE = region_mask(SIZE)
 

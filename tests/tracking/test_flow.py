@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from tests.tracking.scene import SIZE, moved, texture
 from tracking.features import detect_corners
 from tracking.flow import Flow, Grays, spread_order
-from tracking.region import region_mask
+from tracking.region.mask import region_mask
 
 BEFORE = Grays.of(texture())
 POINTS = detect_corners(BEFORE.full, region_mask(SIZE, (60, 60, 200, 120)), 300)

@@ -7,7 +7,7 @@ import pytest
 from tests.tracking.scene import SIZE, moved, texture, tilt
 from tracking.features import detect_corners
 from tracking.guarded import Change, Guarded, GuardedTracker, same_background
-from tracking.region import region_mask
+from tracking.region.mask import region_mask
 
 IMAGE = texture()
 POINTS = detect_corners(cv2.cvtColor(IMAGE, cv2.COLOR_BGR2GRAY), region_mask(SIZE, (70, 55, 180, 130)), 250)

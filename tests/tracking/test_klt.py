@@ -7,7 +7,7 @@ import pytest
 from tests.tracking.scene import SIZE, moved, texture, tilt
 from tracking.features import detect_corners
 from tracking.klt import Observation, PointTracker
-from tracking.region import region_mask
+from tracking.region.mask import region_mask
 from tracking.tracks import Truth
 from tracking.video import Video
 

@@ -6,7 +6,7 @@ import pytest
 
 from tests.tracking.scene import SIZE, moved, texture, tilt
 from tracking.features import detect_corners
-from tracking.region import region_mask
+from tracking.region.mask import region_mask
 from tracking.relocalisation import Relocalisation
 
 IMAGE = texture()

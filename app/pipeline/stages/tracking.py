@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from app.arrays import Array, Image
 from app.options.run import Run
+from app.pipeline.stages.first_look import first_look
 from reconstruction.camera import Camera
 from reconstruction.settings import RecoveredRestShape
 from tracking import TrackingError
 from tracking.features import detect_corners
 from tracking.guarded import Guarded, GuardedTracker
-from tracking.region import region_mask
+from tracking.region.mask import region_mask
 from tracking.video import Frame, Video
 
 LAG = 2  # frames between a frame and the first one whose tracking may know its shape: so many are on the way
@@ -128,9 +129,11 @@ class TrackingStage:
         Raises:
             UsageError, TrackingError: the source breaks off, or a region, mask or mesh does not fit the picture.
         """
-        if self._frames is None:
-            self._frames = iter(self.video)
         began = perf_counter()
+        if self._frames is None:
+            look = first_look(self._config, self.video)
+            self._frames, self._region = look.frames, look.region
+            self._told += look.notes
         frame = next(self._frames, None)
         if frame is None:
             return None
@@ -149,21 +152,22 @@ class TrackingStage:
         if one in self._trackers:
             return self._trackers[one].track(frame.image, expected_px)
         try:
-            points_px = first_points(self._config, frame.image)
+            points_px = first_points(self._config, frame.image, self._region)
         except TrackingError as error:
             return error
+        self._region = region_mask(
+            self.video.size, self._config.roi, self._config.mask
+        )  # another object may be anywhere in it
         self._trackers[one] = GuardedTracker(frame.image, points_px)
         return Begun(points_px)
 
 
-def first_points(config: Run, image: Image) -> Array:
-    """The points (P, 2) px of an object that begins in a picture.
+def first_points(config: Run, image: Image, region: Image) -> Array:
+    """The points (P, 2) px of an object that begins in a picture, in a region (H, W) uint8 of it.
 
     Raises:
-        UsageError, TrackingError: a region, mask or mesh that does not fit the picture, or too few corners.
+        UsageError, TrackingError: a mesh that does not fit the picture, or too few corners.
     """
-    height, width = image.shape[:2]
-    region = region_mask((width, height), config.roi, config.mask)
     gray = cast(NDArray[np.uint8], cv2.cvtColor(image, cv2.COLOR_BGR2GRAY))
     points_px = detect_corners(gray, region, config.points)
     if config.rest_shape in RECOVERED:

@@ -216,7 +216,7 @@ def test_what_is_covered_has_longer_than_what_was_cut(cut: bool, wait_s: float) 
             if one in trackers:
                 objects[one] = trackers[one].track(picture, expected_px)
             else:
-                objects[one] = begun = Begun(first_points(config, picture))
+                objects[one] = begun = Begun(first_points(config, picture, np.full(picture.shape[:2], 255, np.uint8)))
                 trackers[one] = GuardedTracker(picture, begun.points_px)
         seen = replace(lost, index=index, time_s=100.0 + wait_s - 1.0 + index / 30, objects=objects)
         successor.look(seen, partial(np.copy, picture))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracking import TrackingError
-from tracking.region import region_mask
+from tracking.region.mask import region_mask
 
 SIZE = (64, 48)
 

@@ -1,0 +1,82 @@
+"""What a run begins with: the surface in the first frames, unless the region is to be taken as it is given."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import chain
+
+from app.arrays import Image
+from app.options.run import Source
+from tracking.region.mask import region_mask
+from tracking.region.search import Found, search
+from tracking.region.surface import Surface
+from tracking.video import Frame, Video
+
+MOST_BYTES = 200 * 2**20  # of the first pictures of a live source that are kept while the surface is looked for
+
+
+@dataclass(frozen=True)
+class FirstLook:
+    """Where to begin.
+
+    Attributes:
+        frames: the frames of the run.
+        region: (H, W) uint8, 255 where the surface is in the first of them.
+        notes: what was found and how to overrule it, a line each.
+    """
+
+    frames: Iterator[Frame]
+    region: Image
+    notes: list[str]
+
+
+def first_look(config: Source, video: Video) -> FirstLook:
+    """Look for the surface in the first frames of a video; a file's are read twice, those of a live source kept meanwhile.
+
+    Raises:
+        TrackingError: no frame with texture, or a region or mask that does not fit the picture.
+    """
+    region, frames = region_mask(video.size, config.roi, config.mask), iter(video)
+    if not config.search:
+        return FirstLook(frames, region, [])
+    if video.live:
+        kept: list[Frame] = []
+        found = search(keeping(frames, kept), region)
+        frames = chain(kept, frames)
+    else:
+        with Video(config.source, *config.frame_range, duration_s=config.duration) as ahead:
+            found = search(ahead, region)
+    begun = next(frame for frame in frames if frame.index >= found.first.index)
+    return FirstLook(chain([begun], frames), found.region, notes_on(found, video.first_index))
+
+
+def keeping(frames: Iterator[Frame], kept: list[Frame]) -> Iterator[Frame]:
+    """The frames, kept as they come, until they fill the memory there is for them."""
+    for frame in frames:
+        kept.append(frame)
+        yield frame
+        if len(kept) * frame.image.nbytes > MOST_BYTES:
+            return
+
+
+def notes_on(found: Found, began: int) -> list[str]:
+    """What was found, in words, a line each; nothing where the region is taken as it was given.
+
+    Args:
+        found: that.
+        began: number of the first frame looked at.
+    """
+    blank = found.first.index - began
+    notes = [f"waited {blank} frames for texture: begins with frame {found.first.index}"] if blank else []
+    if found.surface is None:
+        return [*notes, f"nothing moves in {found.frames} frames: the whole region is taken; choose by --roi X Y W H"]
+    if not found.narrowed:
+        return notes
+    note = f"surface found by what moves together in {found.frames} frames: {as_roi(found.surface)}"
+    if found.others:
+        note += f"; others: {', '.join(as_roi(other) for other in found.others)}"
+    return [*notes, f"{note}; choose by --roi X Y W H, --no-search takes it as it is"]
+
+
+def as_roi(surface: Surface) -> str:
+    """The option that stands for a surface."""
+    return "--roi " + " ".join(map(str, surface.box))

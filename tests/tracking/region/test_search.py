@@ -1,0 +1,118 @@
+"""The surface found in small videos that are composed, and in real ones."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tests.tracking.scene import texture
+from tracking import TrackingError
+from tracking.features import detect_corners
+from tracking.region.search import MOST_FRAMES, Found, search
+from tracking.video import Frame, Video
+
+Image = NDArray[np.uint8]
+WHOLE = np.full((240, 320), 255, np.uint8)
+
+
+def scene(*boxes: tuple[int, int, int, int, float], frames: int = 60, wall: Image | None = None) -> Iterator[Frame]:
+    """Textured boxes x, y, width, height before a textured wall, each swinging along x by so many px."""
+    wall = texture(1) if wall is None else wall
+    for k in range(frames):
+        image = wall.copy()
+        for seed, (x, y, w, h, swing) in enumerate(boxes):
+            patch = np.float32([[1, 0, x + swing * np.sin(0.05 * k)], [0, 1, y]])
+            size = (image.shape[1], image.shape[0])
+            inside = cv2.warpAffine(np.full((h, w), 255, np.uint8), patch, size) > 127
+            image[inside] = cv2.warpAffine(texture(10 + seed)[:h, :w], patch, size)[inside]
+        yield Frame(k, k / 30, image)
+
+
+def overlap(found: Found, x: int, y: int, w: int, h: int) -> float:
+    """Intersection over union of the region found and a rectangle."""
+    truth = np.zeros_like(found.region)
+    truth[y : y + h, x : x + w] = 255
+    return float(((truth > 0) & (found.region > 0)).sum() / ((truth > 0) | (found.region > 0)).sum())
+
+
+def test_a_box_before_a_wall_is_found() -> None:
+    found = search(scene((90, 60, 130, 110, 25.0)), WHOLE)
+    assert found.surface is not None
+    assert found.narrowed
+    assert not found.others
+    assert overlap(found, 90, 60, 130, 110) > 0.75
+    assert found.frames < 40  # it has moved enough by then
+
+
+def test_within_a_loose_region_too() -> None:
+    region = np.zeros_like(WHOLE)
+    region[30:210, 40:280] = 255
+    found = search(scene((90, 60, 130, 110, 25.0)), region)
+    assert overlap(found, 90, 60, 130, 110) > 0.75
+
+
+def test_a_tight_region_stays_as_it_is() -> None:
+    region = np.zeros_like(WHOLE)
+    region[65:165, 95:215] = 255
+    found = search(scene((90, 60, 130, 110, 25.0)), region)
+    assert found.surface is not None
+    assert not found.narrowed
+    assert found.region is region
+
+
+def test_of_two_the_larger_that_moves_more_is_taken_and_the_other_named() -> None:
+    found = search(scene((20, 60, 130, 120, 20.0), (210, 70, 90, 100, -12.0)), WHOLE)
+    assert overlap(found, 20, 60, 130, 120) > 0.7
+    assert len(found.others) == 1
+    x, y, w, h = found.others[0].box
+    assert 195 < x < 225
+    assert 55 < y < 85
+    assert 70 < w < 130
+    assert 80 < h < 125
+
+
+def test_a_still_scene_is_taken_whole() -> None:
+    found = search(scene(frames=150), WHOLE)
+    assert found.surface is None
+    assert found.region is WHOLE
+    assert found.frames == MOST_FRAMES
+
+
+def test_black_frames_are_waited_for() -> None:
+    black = [Frame(k, k / 30, np.zeros((240, 320, 3), np.uint8)) for k in range(7)]
+    begun = (Frame(frame.index + 7, frame.time_s, frame.image) for frame in scene((90, 60, 130, 110, 25.0)))
+    found = search([*black, *begun], WHOLE)
+    assert found.first.index == 7
+    assert overlap(found, 90, 60, 130, 110) > 0.75
+
+
+def test_only_black_frames_are_an_error() -> None:
+    with pytest.raises(TrackingError, match="corners"):
+        search([Frame(k, k / 30, np.zeros((240, 320, 3), np.uint8)) for k in range(5)], WHOLE)
+
+
+def test_the_same_twice() -> None:
+    first, second = (search(scene((90, 60, 130, 110, 25.0)), WHOLE) for _ in range(2))
+    np.testing.assert_array_equal(first.region, second.region)
+
+
+@pytest.mark.parametrize(
+    ("name", "surface"),
+    [
+        # outlines of what is held or shown, in the first frame, px
+        ("kinect_paper", [(165, 75), (570, 105), (560, 395), (145, 360)]),
+        ("box", [(296, 100), (400, 5), (595, 72), (590, 100), (540, 242), (310, 170)]),
+        ("talking_face", [(110, 110), (140, 25), (235, 10), (285, 110), (250, 220), (190, 240), (150, 220), (115, 165)]),
+        ("face_turning", [(130, 90), (260, 10), (420, 60), (480, 200), (420, 512), (50, 512)]),
+    ],
+)
+def test_points_in_real_videos_are_on_the_surface(shared_data: Path, name: str, surface: list[tuple[int, int]]) -> None:
+    with Video(str(shared_data / f"{name}.mp4")) as video:
+        found = search(video, np.full(video.size[::-1], 255, np.uint8))
+    points = detect_corners(cv2.cvtColor(found.first.image, cv2.COLOR_BGR2GRAY), found.region)
+    outline = np.array(surface, np.float32)
+    inside = np.array([cv2.pointPolygonTest(outline, (float(x), float(y)), True) > -12 for x, y in points])
+    assert inside.mean() > 0.95  # a hand may move as what it holds

@@ -1,0 +1,131 @@
+"""The surface among groups of points: the one that moves most, and where it is in the picture."""
+
+from dataclasses import dataclass
+from typing import cast
+
+import cv2
+import numpy as np
+
+from tracking import Array, Flags, Floats, Image
+from tracking.consistency import nearest_neighbours
+from tracking.region.groups import groups_of
+
+STILL_PX = 2.0  # a group that moves less does not move
+BESIDE = 8  # points of the surface that say where a point beside them should go
+STRAY_PX = 3.0  # a point that is no farther off is not of something else
+SHARED = 0.5  # of its motion all that is on it shares: a lip or an eyelid, too
+SPACING = 3  # the neighbour whose distance is the usual one
+REACH = 1.0  # times the usual distance between points on it, that the surface goes on beyond them
+GAP = 2.0  # the same: narrower gaps between its parts are its own
+OTHER_SHARE = 0.1  # of the best group's score: less, and a group is not worth a word
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A surface that moves.
+
+    Attributes:
+        mask: (H, W) uint8, 255 where it is.
+        own: (P,) points on it.
+        other: (P,) points of something else.
+        motion_px: median of how far they went.
+    """
+
+    mask: Image
+    own: Flags
+    other: Flags
+    motion_px: float
+
+    @property
+    def box(self) -> tuple[int, int, int, int]:
+        """x, y, width, height of the rectangle around it, px."""
+        x, y, w, h = cv2.boundingRect(self.mask)
+        return int(x), int(y), int(w), int(h)
+
+
+def surfaces(W: Array, region: Image) -> list[Surface]:
+    """What moves in a region, the one with most points times motion first, those not worth a word left out.
+
+    Args:
+        W: (F, P, 2) px, tracks of points of the region; NaN where not seen.
+        region: (H, W) uint8, 255 inside.
+    """
+    found = groups_of(W, float(max(region.shape)))
+    score = np.where(found.motion_px > STILL_PX, found.sizes * found.motion_px, 0.0)
+    order = [int(k) for k in np.argsort(-score, kind="stable") if score[k] > OTHER_SHARE * score.max()]
+    return [surface_of(W, found.label == k, found.label >= 0, region) for k in order]
+
+
+def surface_of(W: Array, group: Flags, grouped: Flags, region: Image) -> Surface:
+    """The surface that a group (P,) of points is on; `grouped` (P,) are in this or another one."""
+    off, carried, way = astray_px(W, group)
+    own = group & (way > SHARED * carried)  # else it was not seen when the others moved
+    motion = float(np.median(way[own]))
+    other = ~group & (grouped | (off > max(STRAY_PX, SHARED * motion)))
+    doubtful = ~own & ~other & ~region.all()  # in a region that somebody chose, points that were lost are as good
+    return Surface(surface_mask(W[0], own | doubtful, other, region), own, other, motion)
+
+
+def astray_px(W: Array, own: Flags) -> tuple[Array, Array, Array]:
+    """How far points are from where a surface would carry them, how far it would, and how far they go, (P,) px each.
+
+    The most of all frames; of those that show a point, but for where it would be carried.
+
+    It carries them as its points go, by one affine map a frame, and by what that leaves over at those beside them.
+
+    Args:
+        W: (F, P, 2) px, NaN where not seen.
+        own: (P,) points of the surface; they do not count for themselves.
+    """
+    index = np.flatnonzero(own)
+    distance = ((W[0][:, None] - W[0][index]) ** 2).sum(axis=2)
+    beside = index[np.argsort(distance, axis=1)[:, : BESIDE + 1]]
+    moved, first = W - W[0], np.column_stack([np.ones(W.shape[1]), W[0] - W[0][index].mean(axis=0)])
+    seen = np.isfinite(moved[:, :, 0])
+    h = (seen & own).astype(np.float64)
+    known = np.where(seen[:, :, None], moved, 0.0)
+    gram = np.einsum("fp,pc,pd->fcd", h, first, first) + 1e-6 * np.eye(3)
+    affine = first @ np.linalg.solve(gram, np.einsum("fp,pc,fpd->fcd", h, first, known))
+    counts = h[:, beside] * (beside != np.arange(W.shape[1])[:, None])
+    left = np.einsum("fpk,fpkc->fpc", counts, (known - affine)[:, beside]) / counts.sum(axis=2).clip(1)[:, :, None]
+    carried = affine + left
+    off = np.where(seen, np.linalg.norm(known - carried, axis=2), 0.0)
+    return off.max(axis=0), np.linalg.norm(carried, axis=2).max(axis=0), np.linalg.norm(known, axis=2).max(axis=0)
+
+
+def surface_mask(place: Array, own: Flags, others: Flags, region: Image) -> Image:
+    """Where a surface is, (H, W) uint8: nearer to its points than to others, and not far from them; without small holes.
+
+    Args:
+        place: (P, 2) px.
+        own: (P,) points of the surface.
+        others: (P,) points that are not.
+        region: (H, W) uint8, 255 where it may be.
+    """
+    points = place[own]
+    spacing = float(np.median(np.linalg.norm(points[nearest_neighbours(points, SPACING)[:, -1]] - points, axis=1)))
+    to_own, to_other = (distance_to(place[which], region.shape[:2]) for which in (own, others))
+    nearer = np.asarray(to_own <= to_other, np.uint8)
+    near = nearer * (to_own < REACH * spacing)
+    whole = cv2.morphologyEx(near, cv2.MORPH_CLOSE, disc(GAP * spacing)) * nearer
+    smooth = cv2.morphologyEx(whole, cv2.MORPH_OPEN, disc(REACH * spacing))
+    contours = cv2.findContours(smooth, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
+    mask = np.zeros(region.shape[:2], np.uint8)
+    cv2.drawContours(mask, contours, -1, (255,), cv2.FILLED)
+    return cast(Image, mask & region)
+
+
+def disc(radius_px: float) -> Image:
+    """A round structuring element."""
+    side = 2 * int(np.ceil(radius_px)) + 1
+    return cast(Image, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
+
+
+def distance_to(points: Array, shape: tuple[int, int]) -> Floats:
+    """Distance (H, W) px of each pixel from the nearest of some points (n, 2); infinite if there are none."""
+    if len(points) == 0:
+        return np.full(shape, np.inf, np.float32)
+    free = np.full(shape, 255, np.uint8)
+    x, y = np.rint(points).astype(int).T
+    free[y.clip(0, shape[0] - 1), x.clip(0, shape[1] - 1)] = 0
+    return cast(Floats, cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE))
