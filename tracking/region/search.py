@@ -7,7 +7,7 @@ import numpy as np
 
 from tracking import Array, Image, TrackingError
 from tracking.features import detect_corners
-from tracking.flow import WINDOW_PX, Grays, follow, spread_order
+from tracking.flow import CONVERGED_PX, GUIDE_LEVELS, Grays, lucas_kanade, returned
 from tracking.region.surface import Surface, surfaces
 from tracking.video import Frame
 
@@ -15,6 +15,7 @@ MOST_FRAMES = 90  # are looked at
 ENOUGH = 0.05  # of the picture's larger side: when the farthest tenth has moved so far, that is enough
 TENTH = 0.9
 COMPARED = 20  # of those frames that are compared
+WINDOW_PX = 15
 FEWEST, POINTS = 50, 800
 LEFT_OUT = 0.03  # of the points: when no more are of something else, a region stays as it was given
 BLANK_FRAMES = 300  # without texture at the beginning, and no more are waited for
@@ -57,12 +58,10 @@ class Search:
 
     def __init__(self, image_bgr: Image, region: Image) -> None:
         self._region, self._grays = region, Grays.of(image_bgr)
-        most = (
-            np.count_nonzero(region) // WINDOW_PX**2
-        )  # nearer ones are seen by the same windows: motion blurs across borders
-        points = detect_corners(self._grays.full, region, int(np.clip(most, FEWEST, POINTS)))
-        self._tracks = [points[spread_order(points)]]
-        self._way = np.zeros(len(points))  # of each point so far, at most
+        # Points nearer to each other are seen by the same windows: their motion blurs across borders.
+        most = int(np.clip(np.count_nonzero(region) // WINDOW_PX**2, FEWEST, POINTS))
+        self._tracks = [detect_corners(self._grays.full, region, most)]
+        self._way = np.zeros(len(self._tracks[0]))  # of each point so far, at most
 
     @property
     def frames(self) -> int:
@@ -76,11 +75,15 @@ class Search:
 
     def add(self, image_bgr: Image) -> None:
         """Look at the next frame."""
-        grays, points = Grays.of(image_bgr), self._tracks[-1]
-        seen = np.isfinite(points[:, 0])
-        moved = np.full_like(points, np.nan)
-        moved[seen] = follow(self._grays, grays, points[seen])
-        self._grays = grays
+        before, self._grays, last = self._grays.full, Grays.of(image_bgr), self._tracks[-1]
+        now, moved = self._grays.full, np.full_like(last, np.nan)
+        seen = np.flatnonzero(np.isfinite(last[:, 0]))
+        if len(seen):
+            start, levels = last[seen], GUIDE_LEVELS + 1 + max(0, round(np.log2(max(now.shape) / 640.0)))
+            still = np.zeros_like(start)  # no guides: what has no texture would go where they go
+            there, good = lucas_kanade(before, now, start, still, WINDOW_PX, levels, CONVERGED_PX)
+            good &= returned(before, now, start, there, still, WINDOW_PX, levels)
+            moved[seen[good]] = there[good]
         self._tracks.append(moved)
         self._way = np.fmax(self._way, np.linalg.norm(moved - self._tracks[0], axis=1))
 

@@ -155,9 +155,7 @@ class TrackingStage:
             points_px = first_points(self._config, frame.image, self._region)
         except TrackingError as error:
             return error
-        self._region = region_mask(
-            self.video.size, self._config.roi, self._config.mask
-        )  # another object may be anywhere in it
+        self._region = region_mask(self.video.size, self._config.roi, self._config.mask)  # others may be anywhere in it
         self._trackers[one] = GuardedTracker(frame.image, points_px)
         return Begun(points_px)
 
