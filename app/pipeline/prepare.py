@@ -17,14 +17,14 @@ from reconstruction.online import Reconstruction
 from reconstruction.settings import RecoveredRestShape, Settings
 
 
-def estimator(config: Run, size: tuple[int, int], points_px: Array, start: Start) -> Reconstruction:
+def estimator(config: Run, size: tuple[int, int], points_px: Array, start: Start, frames: int | None) -> Reconstruction:
     """The estimator before it has seen a frame, whose models are made by `start`.
 
     Args:
         config: what the person asked for.
         size: (width, height) of the pictures, px.
         points_px: (P, 2) the points in the first frame.
-        start: as for `Mapper`.
+        start, frames: as for `Mapper`.
 
     Raises:
         UsageError: a mesh that does not fit.
@@ -35,7 +35,9 @@ def estimator(config: Run, size: tuple[int, int], points_px: Array, start: Start
     camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
     settings = settings_of(model, config.rest_shape, estimate_focal=not isinstance(model.focal, float))
     if config.rest_shape in RECOVERED:
-        return Reconstruction(camera, settings, mapper=Mapper(settings, start, latency=LATENCY, live=config.live))
+        return Reconstruction(
+            camera, settings, mapper=Mapper(settings, start, latency=LATENCY, frames=frames, live=config.live)
+        )
     return Reconstruction(camera, settings, rest_of_surface(Path(config.rest_shape), points_px, camera)[0])
 
 

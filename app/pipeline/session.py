@@ -94,7 +94,8 @@ class Session:
     def _begun(self, seen: Seen) -> TrackedObject:
         """The first object. Raises the error if there is none."""
         first = Frame(seen.index, seen.time_s, self._tracking.picture(seen.number, keep=True))
-        return TrackedObject(self._config, 0, first, seen.begun(0).points_px, self._watch, self._begin_map)
+        frames = self._tracking.opened.frame_count
+        return TrackedObject(self._config, 0, first, seen.begun(0).points_px, self._watch, self._begin_map, frames)
 
     def _objects(self, source: Iterator[Seen]) -> Iterator[Processed]:
         """The frames of one object after another."""

@@ -45,6 +45,7 @@ class TrackedObject:
         points_px: (P, 2) its points in it.
         watch: to time it.
         start: begins to make its models.
+        frames: so many there will be, if that is known.
 
     Attributes:
         config, number, first, points_px: the same.
@@ -57,14 +58,23 @@ class TrackedObject:
         UsageError, TrackingError: a mesh or truth that does not fit.
     """
 
-    def __init__(self, config: Run, number: int, first: Frame, points_px: Array, watch: Stopwatch, start: Start) -> None:
+    def __init__(
+        self,
+        config: Run,
+        number: int,
+        first: Frame,
+        points_px: Array,
+        watch: Stopwatch,
+        start: Start,
+        frames: int | None = None,
+    ) -> None:
         self.config, self.number, self.first, self.points_px, self._watch = config, number, first, points_px, watch
         self._truth = Truth.load(config.ground_truth) if config.ground_truth else None
         self.collected = self._nothing()
         self.online: Collected | None = None
         self._texture = first_picture(config.texture) if config.texture else None
         height, width = first.image.shape[:2]
-        self.reconstruction = estimator(config, (width, height), points_px, start)
+        self.reconstruction = estimator(config, (width, height), points_px, start, frames)
         self.lost = False
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
         stored = config.passes or config.output.tracks_out

@@ -49,6 +49,7 @@ class Mapper:
     Args:
         settings: how to reconstruct.
         start: where models are made.
+        frames: so many there will be, if that is known: what would be in force later is not begun.
         live: whether frames do not wait for models: each is in force as soon as it is there. Else the first is when it is
             begun, and others a fixed number of frames later, so that shapes depend on no machine's speed.
 
@@ -57,8 +58,11 @@ class Mapper:
         first_frames: so many gave the first model.
     """
 
-    def __init__(self, settings: Settings, start: Start = at_once, *, latency: int = 0, live: bool = False) -> None:
+    def __init__(
+        self, settings: Settings, start: Start = at_once, *, latency: int = 0, frames: int | None = None, live: bool = False
+    ) -> None:
         self._settings, self._start, self._latency, self.live = settings, start, latency, live
+        self._frames = np.inf if frames is None else frames
         self._keyframes = Keyframes() if settings.maps else None
         self._frame = -1
         self._first: list[tuple[Array, Mask]] | None = []  # frames, until they have given the first model
@@ -139,6 +143,8 @@ class Mapper:
     def _look_again(self, camera: Camera) -> None:
         """Begin a map, if the keyframes have more to tell than when they were last looked at."""
         keyframes = self._keyframes
+        if self._frame + self._latency >= self._frames:
+            return
         if keyframes is None or self._map_job or self._frame + 1 < self._looks[-1] or len(keyframes.frames) < FEWEST:
             return
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
