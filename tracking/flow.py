@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking import Array, Flags, Image, Indices
 
-WINDOW_PX = 11
+WINDOW_PX = 15
 # The guides find the motion, the others only refine it. With all points on all levels, 21 % of kinect_paper's
 # fail between frames 60 and 61 (its texture repeats), in 20 ms; led by guides, none, in 8 ms (one core). Guides are
 # followed in the half picture, which is as good a guide at a quarter of the cost. Dense flow (DIS, ultrafast) as the guide

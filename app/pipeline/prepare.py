@@ -24,7 +24,8 @@ def estimator(config: Run, size: tuple[int, int], points_px: Array, start: Start
         config: what the person asked for.
         size: (width, height) of the pictures, px.
         points_px: (P, 2) the points in the first frame.
-        start, frames: as for `Mapper`.
+        start: as for `Mapper`.
+        frames: the same.
 
     Raises:
         UsageError: a mesh that does not fit.
@@ -35,9 +36,8 @@ def estimator(config: Run, size: tuple[int, int], points_px: Array, start: Start
     camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
     settings = settings_of(model, config.rest_shape, estimate_focal=not isinstance(model.focal, float))
     if config.rest_shape in RECOVERED:
-        return Reconstruction(
-            camera, settings, mapper=Mapper(settings, start, latency=LATENCY, frames=frames, live=config.live)
-        )
+        mapper = Mapper(settings, start, latency=LATENCY, frames=frames, live=config.live)
+        return Reconstruction(camera, settings, mapper=mapper)
     return Reconstruction(camera, settings, rest_of_surface(Path(config.rest_shape), points_px, camera)[0])
 
 
