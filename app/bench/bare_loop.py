@@ -10,10 +10,10 @@ import numpy as np
 
 from tracking import Array, Image
 from tracking.features import detect_corners
-from tracking.flow import GUIDE_LEVELS, GUIDE_WINDOW_PX, GUIDES, Grays, spread_order
+from tracking.flow import GUIDE_LEVELS, GUIDES, Grays, spread_order
 from tracking.region.mask import region_mask
 
-WINDOW_PX = 15  # what a tracker needs that has nothing but this to go by
+WINDOW_PX, GUIDE_WINDOW_PX = 15, 11  # what a tracker needs that has nothing but this to go by
 
 
 def bare_loop(video: str, roi: tuple[int, int, int, int], points: int, frames: int) -> tuple[float, float]:

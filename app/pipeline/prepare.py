@@ -7,7 +7,6 @@ from typing import cast
 import numpy as np
 
 from app.arrays import Array
-from app.files.mesh_file import rest_of_surface
 from app.options.model import Model
 from app.options.run import Run
 from app.pipeline.stages.tracking import RECOVERED
@@ -38,6 +37,8 @@ def estimator(config: Run, size: tuple[int, int], points_px: Array, start: Start
     if config.rest_shape in RECOVERED:
         mapper = Mapper(settings, start, latency=LATENCY, frames=frames, live=config.live)
         return Reconstruction(camera, settings, mapper=mapper)
+    from app.files.mesh_file import rest_of_surface  # trimesh takes its time to load
+
     return Reconstruction(camera, settings, rest_of_surface(Path(config.rest_shape), points_px, camera)[0])
 
 

@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.arrays import Array
+from app.arrays import Array, Image
 from app.files.stored_tracks import StoredFrame, StoredTracks
 from app.files.writing import writable
 from app.options.run import Run, configuration
-from app.painting.compositing import Placement, painted
-from app.painting.picture import first_picture
 from app.pipeline.estimates import Collected, Scores, save_shapes
 from app.pipeline.prepare import estimator
 from app.pipeline.processed import Surface
@@ -72,7 +70,11 @@ class TrackedObject:
         self._truth = Truth.load(config.ground_truth) if config.ground_truth else None
         self.collected = self._nothing()
         self.online: Collected | None = None
-        self._texture = first_picture(config.texture) if config.texture else None
+        self._texture: Image | None = None
+        if config.texture:
+            from app.painting.picture import first_picture  # what few need
+
+            self._texture = first_picture(config.texture)
         height, width = first.image.shape[:2]
         self.reconstruction = estimator(config, (width, height), points_px, start, frames)
         self.lost = False
@@ -103,6 +105,8 @@ class TrackedObject:
         assert metric is not None
         model, seen = self.reconstruction.model, self.first.image
         if self._texture is not None:
+            from app.painting.compositing import Placement, painted
+
             placement = Placement(self.config.place, self.config.opacity)
             seen = painted(seen, self.points_px, model, self._texture, placement)
         return Surface(self.first, self.points_px, model, metric, seen)
