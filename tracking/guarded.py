@@ -9,6 +9,7 @@ import numpy as np
 
 from tracking import Array, Image
 from tracking.klt import Observation, PointTracker
+from tracking.region.left_behind import LeftBehind
 from tracking.relocalisation import Relocalisation
 
 # A hand over the sheet leaves points around it, and comes within several frames; a cut leaves 0 to 20 % at once.
@@ -73,6 +74,7 @@ class GuardedTracker:
         self._reference = self._image = image_bgr  # the first, and the last that showed the surface
         self._points = points_px
         self._tracker = PointTracker(image_bgr, points_px)
+        self._left_behind = LeftBehind(points_px)
         self._relocalisation: Relocalisation | None = None
         self._shares = deque([1.0], RECENT_FRAMES)  # of the points seen in the last frames
         self._last_px = points_px.copy()  # where the surface was last: seen or predicted
@@ -84,7 +86,7 @@ class GuardedTracker:
         if self.lost:
             return self._search(image_bgr)
         observation = self._tracker.track(image_bgr, predicted_px)
-        share = float(observation.visible.mean())
+        share = self._share(observation)
         just_now = max(self._shares)
         jumped = share < COLLAPSED_SHARE * just_now and share < FEW_SHARE
         if jumped or share < LOST_SHARE or observation.visible.sum() < MIN_POINTS:
@@ -97,7 +99,11 @@ class GuardedTracker:
         self._image = image_bgr
         seen = observation.visible[:, None]
         self._last_px = np.where(seen, observation.points_px, self._last_px if predicted_px is None else predicted_px)
-        return Guarded(observation)
+        behind = self._left_behind.look(observation)
+        if not behind:
+            return Guarded(observation)
+        self._tracker.give_up(self._left_behind.points)
+        return Guarded(observation, reason=f"{behind} points stay behind while the surface moves: they are given up")
 
     def _search(self, image_bgr: Image) -> Guarded:
         self.frames_lost += 1
@@ -118,7 +124,7 @@ class GuardedTracker:
             enough = self._good(found, FOUND_SHARE)
         if not enough:
             return Guarded(self._nothing())
-        share = float(found.visible.mean())
+        share = self._share(found)
         frames, self.lost, self.frames_lost = self.frames_lost - 1, False, 0
         self._shares.clear()
         self._shares.append(share)
@@ -132,7 +138,11 @@ class GuardedTracker:
         return self.frames_lost <= SEARCH_EVERY_FRAME or self.frames_lost % SEARCH_EVERY == 0
 
     def _good(self, observation: Observation, share: float) -> bool:
-        return observation.visible.mean() >= share and int(observation.visible.sum()) >= MIN_POINTS
+        return self._share(observation) >= share and int(observation.visible.sum()) >= MIN_POINTS
+
+    def _share(self, observation: Observation) -> float:
+        """Of the points that are on the surface those that are seen."""
+        return float(observation.visible.sum() / max((~self._left_behind.points).sum(), 1))
 
     def _nothing(self) -> Observation:
         return Observation(np.full_like(self._points, np.nan), np.zeros(len(self._points), np.bool_))

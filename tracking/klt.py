@@ -57,6 +57,12 @@ class PointTracker:
         self._coarse = Appearance(coarse, self._reference / 2.0, PATCH_RADIUS)
         self._points = self._reference.copy()
         self._affine = np.broadcast_to(np.eye(2), (len(points_px), 2, 2)).copy()
+        self._given_up = np.zeros(len(points_px), np.bool_)
+
+    def give_up(self, points: Flags) -> None:
+        """Look for these points (P,) no more."""
+        self._given_up |= points
+        self._points[points] = np.nan
 
     def track(self, image_bgr: Image, predicted_px: Array | None = None) -> Observation:
         """Find the points in the next frame.
@@ -73,7 +79,7 @@ class PointTracker:
         points[~motion.consistent] = np.nan
         points = self._refine(fine, coarse, points, motion)
         points = self._retrieve(fine, coarse, points, self._expected(points, motion, predicted_px), motion)
-        points[~_inside(points, fine.shape)] = np.nan
+        points[self._given_up | ~_inside(points, fine.shape)] = np.nan
         self._grays, self._points, self._affine = grays, points, motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
 
@@ -92,7 +98,7 @@ class PointTracker:
             motion = self._motion(sought, None)
             expected = np.where(np.isfinite(points), np.nan, sought)
             points = self._retrieve(fine, coarse, points, expected, motion)
-        points[~_inside(points, fine.shape)] = np.nan
+        points[self._given_up | ~_inside(points, fine.shape)] = np.nan
         self._points, self._affine = points, motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
 

@@ -17,7 +17,7 @@ from reconstruction.camera import Camera
 from reconstruction.settings import RecoveredRestShape
 from tracking import TrackingError
 from tracking.features import detect_corners
-from tracking.guarded import Guarded, GuardedTracker
+from tracking.guarded import Change, Guarded, GuardedTracker
 from tracking.region.mask import region_mask
 from tracking.video import Frame, Video
 
@@ -150,7 +150,10 @@ class TrackingStage:
 
     def _object(self, one: int, frame: Frame, expected_px: Array | None) -> Begun | Guarded | TrackingError:
         if one in self._trackers:
-            return self._trackers[one].track(frame.image, expected_px)
+            guarded = self._trackers[one].track(frame.image, expected_px)
+            if guarded.change is Change.NONE and guarded.reason:
+                self._told.append(f"frame {frame.index}: {guarded.reason}")
+            return guarded
         try:
             points_px = first_points(self._config, frame.image, self._region)
         except TrackingError as error:
