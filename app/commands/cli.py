@@ -23,6 +23,7 @@ from app.options.reproduce import Reproduce
 from app.options.retexture import Retexture
 from app.options.review import Review
 from app.options.run import Demo, Run
+from app.terminal.arguments import meant, spelled_out
 from app.terminal.errors import UsageError, in_a_line
 from app.terminal.exit_code import ExitCode
 
@@ -59,27 +60,57 @@ def main() -> NoReturn:
 
 
 def parse(arguments: list[str]) -> Any:
-    """The options of the command asked for; a mistake is told in one line instead of a panel."""
+    """The options of the command asked for; a mistake is told in one line instead of a panel.
+
+    Raises:
+        UsageError: a list of numbers that is none.
+    """
+    kinds = {name: kind for name, (kind, _) in COMMANDS.items()}
     if arguments == ["--version"]:
         from importlib.metadata import version
 
-        sys.stdout.write(f"modeshape {version('modeshape')}\n")
-        sys.exit(ExitCode.DONE)
-    commands: Any = reduce(or_, [Annotated[kind, tyro.conf.subcommand(name)] for name, (kind, _) in COMMANDS.items()])
+        show(f"modeshape {version('modeshape')}\n")
+    name = arguments[0] if arguments and arguments[0] in kinds else ""
+    if not arguments or {"--help", "-h"} & set(arguments):
+        from app.terminal.pages import overview, page
+
+        show(page(name, kinds[name]) if name else overview(DESCRIPTION, kinds))
+    everything = ["--help" if one == "--help-all" else one for one in spelled_out(arguments)]
+    commands: Any = reduce(or_, [Annotated[kind, tyro.conf.subcommand(one)] for one, kind in kinds.items()])
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
             return tyro.cli(
                 commands,
                 prog="modeshape",
-                args=arguments or ["--help"],
+                args=everything,
                 description=DESCRIPTION,
                 config=(tyro.conf.AvoidSubcommands,),
             )
     except SystemExit as stop:
         if stop.code in (0, None):
             raise
-        fail(in_one_line(complaint.getvalue()))
+        fail(with_hint(in_one_line(complaint.getvalue()), name))
+
+
+def with_hint(complaint: str, name: str) -> str:
+    """What tyro complains about, and what may have been meant; what a command is called does not begin with its options."""
+    what, _, where = complaint.partition("; see ")
+    where = f"modeshape {name} --help".replace("  ", " ")
+    if what.startswith("Unrecognized options: "):
+        from app.terminal.pages import names
+
+        unknown = what.removeprefix("Unrecognized options: ").split(", ")
+        what = f"there is no {unknown[0]}" if unknown[0].startswith("-") else f"not understood: {' '.join(unknown)}"
+        hint = meant(unknown, names(COMMANDS[name][0]) if name else (), COMMANDS)
+        return f"{what}: {hint}" if hint else f"{what}; see {where}"
+    return f"{what}; see {where}"
+
+
+def show(text: str) -> NoReturn:
+    """Print, and end."""
+    sys.stdout.write(text)
+    sys.exit(ExitCode.DONE)
 
 
 def in_one_line(panel: str) -> str:
@@ -102,7 +133,7 @@ def carry_out(options: Any) -> ExitCode:
     if options.json:
         sys.stdout.write(summary.as_json() + "\n")
     else:
-        summary.print_table()
+        summary.print_table() if options.verbose else summary.print_short()
         if summary.hint:
             sys.stderr.write(f"{summary.hint}\n")
     return summary.exit_code

@@ -18,7 +18,7 @@ from app.terminal.progress import Progress
 from app.terminal.summary import Summary
 
 # Parts of the configuration that have a row of their own, or say nothing about the result.
-ELSEWHERE = ("source", "out", "overwrite", "tracks_out", "shapes_out", "view", "connect", "json")
+ELSEWHERE = ("source", "out", "overwrite", "tracks_out", "shapes_out", "view", "connect", "json", "verbose")
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import tyro
 
@@ -17,6 +18,11 @@ class Evaluate(Json, Overwrite, FinalPass, FromTracks):
       modeshape evaluate tracks.npz --rest-shape first-truth --deformation bending
       modeshape evaluate tracks.npz --missing 0.4 --seed 0 --json
     """
+
+    ESSENTIAL: ClassVar = (
+        *("tracks", "rest_shape", "camera", "focal", "deformation", "missing", "noise", "outliers", "seed", "shapes_out"),
+        *("final_pass", "json", "verbose"),
+    )
 
     tracks: tyro.conf.Positional[Path]
     """Tracks (.npz): W (F, 2, P), visible (F, P), and K, S_gt, gt_frames where known."""

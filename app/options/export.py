@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 import tyro
 
@@ -34,6 +34,8 @@ class Export(Json, Overwrite, Online):
       modeshape export recordings/demo.rrd --format obj --axes y-up --out sheet_obj
       modeshape export recordings/demo.rrd --out demo.webm
     """
+
+    ESSENTIAL: ClassVar = ("recording", "format", "out", "axes")
 
     recording: tyro.conf.Positional[Path]
     """The recording (.rrd); one of a killed run will do."""

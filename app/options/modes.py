@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import tyro
 
@@ -20,6 +21,19 @@ class Modes(Json, Overwrite, FromTracks):
       modeshape modes recordings/demo.rrd --out modes.png
       modeshape modes tracks.npz --rest-shape first-truth --metric manhattan
     """
+
+    ESSENTIAL: ClassVar = (
+        "source",
+        "out",
+        "columns",
+        "rest_shape",
+        "metric",
+        "modes",
+        "camera",
+        "focal",
+        "overwrite",
+        "json",
+    )
 
     source: tyro.conf.Positional[Path]
     """A recording (.rrd) or tracks (.npz)."""

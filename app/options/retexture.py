@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import ClassVar
 
 import tyro
 
@@ -21,6 +22,11 @@ class Retexture(Json, Overwrite, Source):
       modeshape retexture recordings/demo.rrd --texture poster.png --out poster.mp4
       modeshape retexture paper.mp4 --roi 195 95 325 265 --texture logo.png --place 250 160 90 60 --out logo.webm
     """
+
+    ESSENTIAL: ClassVar = (
+        *("source", "texture", "out", "place", "opacity", "roi", "corners", "mask", "frames", "focal", "rrd", "view"),
+        *("json", "overwrite"),
+    )
 
     source: tyro.conf.Positional[str]
     """A recording (.rrd), or what `run` takes: video file, image pattern, camera index or URL."""

@@ -2,13 +2,15 @@
 
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import tyro
 
 from app.options.model import Model, priors_text
 from app.options.shared import FinalPass, Json, Overwrite
 from app.terminal.errors import UsageError
+
+FEWEST_POINTS = 20  # of which a map is made
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,9 @@ class Source:
     def __post_init__(self) -> None:
         if self.jobs is not None and self.jobs < 1:
             raise UsageError(f"--jobs {self.jobs} is too few: give 1 and more")
-        if self.points < 4:
-            raise UsageError(f"--points {self.points} is too few: give 4 and more")
+        if self.points < FEWEST_POINTS:
+            few = f"a surface cannot be told from {self.points} points"
+            raise UsageError(f"--points {self.points} is too few: {few}; give {FEWEST_POINTS} and more, best 300 to 1000")
         if self.duration is not None and not self.duration > 0:
             raise UsageError(f"--duration {self.duration} is no time: give seconds, more than 0")
         if self.place is not None and min(self.place[2:]) < 1:
@@ -110,6 +113,11 @@ class Run(FinalPass, Source):
       modeshape run sheet.mp4 --texture logo.png --place 250 160 90 60 --view
     """
 
+    ESSENTIAL: ClassVar = (
+        *("source", "roi", "corners", "mask", "frames", "focal", "size_mm", "out", "shapes_out", "texture"),
+        *("view", "ground_truth", "json", "verbose", "overwrite"),
+    )
+
     ground_truth: Path | None = None
     """True shapes (.npz with W_px, S_gt, gt_frames) to score the first object against."""
     texture: Path | None = None
@@ -131,6 +139,11 @@ class Run(FinalPass, Source):
     def json(self) -> bool:
         """Whether the summary is printed as JSON."""
         return self.output.json
+
+    @property
+    def verbose(self) -> bool:
+        """Whether all of it is printed."""
+        return self.output.verbose
 
 
 @dataclass(frozen=True)

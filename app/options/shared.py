@@ -14,6 +14,8 @@ class Json:
 
     json: bool = False
     """Print the summary as JSON on stdout."""
+    verbose: bool = False
+    """Print all that is known, not the most important lines."""
 
 
 @dataclass(frozen=True, kw_only=True)

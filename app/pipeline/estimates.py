@@ -9,6 +9,7 @@ import numpy as np
 
 from app.arrays import Array
 from app.files.writing import writable
+from app.pipeline.verdict import Course
 from app.terminal.summary import Summary
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model
@@ -30,6 +31,7 @@ class Collected:
         residuals: their number.
         last_rms_px: of the newest estimate.
         switches: how often the window took another branch: bent or tilted otherwise.
+        course: what each frame tells of its quality.
     """
 
     everything: bool
@@ -40,6 +42,7 @@ class Collected:
     residuals: int = 0
     last_rms_px: float | None = None
     switches: int = 0
+    course: Course = field(default_factory=Course)
 
     def add(self, frame: int, estimate: ShapeEstimate) -> None:
         """Add the estimate of a source frame."""
@@ -49,11 +52,13 @@ class Collected:
         self.squared_px += squared
         self.residuals += len(seen)
         self.switches += estimate.switch is not None
+        self.course.add(frame, estimate)
         if self.everything or frame in self.truth_frames:
             self.estimates[frame] = estimate
 
     def lose(self, frame: int) -> None:
         """Note a source frame in which the object is lost."""
+        self.course.lost += 1
         if self.everything:
             self.lost.append(frame)
 

@@ -15,9 +15,11 @@ from app.options.evaluate import Evaluate
 from app.pipeline.estimates import Collected, Scores, save_shapes, sigmas
 from app.pipeline.prepare import settings_of
 from app.pipeline.stages.tracking import RECOVERED
+from app.pipeline.summary import KINDS
+from app.pipeline.verdict import Grade, verdict
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
-from app.terminal.summary import Summary
+from app.terminal.summary import Summary, print_lines
 from reconstruction.basis import rest_shape
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.rest_shape import RestShape
@@ -33,6 +35,8 @@ class Evaluation(Summary):
     """What came of given tracks; the score is there if the truth is."""
 
     tracks: str
+    verdict: Grade
+    verdict_reason: str
     frames: int
     points: int
     modes: int
@@ -49,6 +53,19 @@ class Evaluation(Summary):
     ms_per_frame: float
     score: Scores | None = None
     e3d_online: float | None = None
+
+    def print_short(self) -> None:
+        """The verdict, and what it is about."""
+        e3d = None if self.score is None else f"e3d {self.score.e3d:.2%}, rest shape alone {self.score.e3d_static:.2%}"
+        print_lines(
+            f"{self.verdict}: {self.verdict_reason}",
+            {
+                "surface": f"{KINDS.get(self.rest_shape, self.rest_shape)}, {self.points} points, {self.modes} modes",
+                "frames": f"{self.frames} of {self.ms_per_frame:.1f} ms",
+                "error": None if self.reprojection_rms is None else f"{self.reprojection_rms:.4g}, RMS",
+                "against the truth": e3d,
+            },
+        )
 
 
 def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
@@ -94,8 +111,11 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
 
         scores, before = scored(estimates), scored(online)
     camera = reconstruction.camera
+    word = verdict(collected.course, reconstruction.map)
     return Evaluation(
         tracks=str(config.tracks),
+        verdict=word.grade,
+        verdict_reason=word.reason,
         frames=frames,
         points=points,
         modes=len(reconstruction.model.basis.eigenvalues),

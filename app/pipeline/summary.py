@@ -8,9 +8,12 @@ from typing import Literal
 from app.pipeline.estimates import Scores
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
+from app.pipeline.verdict import Grade, verdict
 from app.terminal.exit_code import ExitCode
-from app.terminal.summary import Summary
+from app.terminal.summary import Summary, print_lines
 from tracking.guarded import Change, Guarded
+
+KINDS = {"isometric": "sheet", "rigid": "solid", "plane": "flat sheet", "mesh": "mesh given", "truth": "shape given"}
 
 
 @dataclass
@@ -59,6 +62,8 @@ class RunSummary(Summary):
 
     Attributes:
         source: the video.
+        verdict: how good it is, in a word, and
+        verdict_reason: why, and what helps.
         frames: so many were processed.
         interrupted: whether it ended before the video did.
         points: vertices of the mesh.
@@ -90,6 +95,8 @@ class RunSummary(Summary):
     """
 
     source: str
+    verdict: Grade
+    verdict_reason: str
     frames: int
     interrupted: bool
     points: int
@@ -119,6 +126,23 @@ class RunSummary(Summary):
     parts: int | None = None
     last_part: Path | None = None
 
+    def print_short(self) -> None:
+        """The verdict, and what it is about."""
+        focal = "" if self.focal_px is None else f", focal length {self.focal_px:.0f} px"
+        share = f", {self.visible_share:.0%} seen" if self.visible_share is not None else ""
+        lost = f", lost {self.losses} times" if self.losses else ""
+        print_lines(
+            f"{self.verdict}: {self.verdict_reason}",
+            {
+                "surface": f"{KINDS.get(str(self.rest_shape), self.rest_shape)}, {self.points} points{share}{lost}{focal}",
+                "frames": f"{self.frames} at {self.fps:.1f} a second{', interrupted' if self.interrupted else ''}",
+                "error": None if self.reprojection_rms_px is None else f"{self.reprojection_rms_px:.2f} px, RMS",
+                "against the truth": None if self.score is None else f"e3d {self.score.e3d:.2%}",
+                "objects": f"{self.objects}, one after another" if self.objects > 1 else None,
+                "recording": self.recording if self.parts is None else f"{self.recording} to {self.last_part}",
+            },
+        )
+
     @property
     def hint(self) -> str:
         """How to look at the recording."""
@@ -135,11 +159,14 @@ def summary_of(
 ) -> RunSummary:
     """The summary of a run and of one of its objects."""
     reconstruction, collected = tracked.reconstruction, tracked.collected
+    word = verdict(collected.course, reconstruction.map)
     rest, camera = reconstruction.rest, reconstruction.camera
     online = tracked.score(tracked.online)
     several = len(recordings) > 1
     return RunSummary(
         source=tracked.config.source,
+        verdict=word.grade,
+        verdict_reason=word.reason,
         frames=counts.frames,
         interrupted=interrupted,
         points=len(tracked.points_px),

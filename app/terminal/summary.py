@@ -36,8 +36,12 @@ class Summary:
         return json.dumps(self.as_dict(), indent=2)
 
     def print_table(self) -> None:
-        """A table on stdout."""
+        """All of it as a table on stdout."""
         print_rows(self.as_dict())
+
+    def print_short(self) -> None:
+        """What most people want to know, in at most ten lines on stdout."""
+        self.print_table()
 
     @property
     def hint(self) -> str:
@@ -52,11 +56,17 @@ class Summary:
 
 def print_rows(words: Mapping[str, object]) -> None:
     """Names and values as a table on stdout; rows without a value are left out."""
-    table = Table(title="modeshape", show_header=False, title_justify="left")
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
     for name, value in words.items():
         if value is not None:
             table.add_row(name, in_words(name, value))
     Console().print(table)
+
+
+def print_lines(headline: str, rows: Mapping[str, object]) -> None:
+    """A line, and names and values under it, on stdout."""
+    Console().print(headline, highlight=False, markup=False)
+    print_rows(rows)
 
 
 def in_words(name: str, value: object) -> str:

@@ -38,6 +38,7 @@ class Map:
         unit_px: pixels of the first keyframe in a unit of the sheet.
         modes: how many it is worth.
         focal_note: how the focal length was found, in words; empty if it was not looked for.
+        evidence: what keyframes say for it, half against half; None of first frames and given shapes.
     """
 
     rest: RestShape
@@ -46,6 +47,7 @@ class Map:
     unit_px: float = 1.0
     modes: int = USUAL_MODES
     focal_note: str = ""
+    evidence: Evidence | None = None
 
     def expected(self, model: Model, W: Array, visible: Mask, last: State | None) -> State | None:
         """Pose and Λ' of a sheet in another frame, by its lengths; None for a solid, or with too few points.
@@ -136,7 +138,7 @@ def solid_map(
     if estimate_focal and np.nanmedian(found.residual_px) > RIGID * rms_radius(found.shape):
         found = bundle_adjust(W, visible, camera, refine_focal=False, known=known)
     rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
-    return Map(rest, found.camera, modes=modes_held(W, visible, found, camera))
+    return Map(rest, found.camera, modes=modes_held(W, visible, found, camera), evidence=evidence)
 
 
 def sheet_map(camera: Camera, found: IsometricSheet, evidence: Evidence, *, estimate_focal: bool) -> Map:
@@ -160,7 +162,7 @@ def sheet_map(camera: Camera, found: IsometricSheet, evidence: Evidence, *, esti
     s = found.camera.focal_px / (unit_px * origin[:, 2])
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, (s * unit_px)[:, None] * origin[:, :2])
     note = f"sheet from {len(shapes)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
-    return Map(RestShape("isometric", motion, note), camera, found, unit_px)
+    return Map(RestShape("isometric", motion, note), camera, found, unit_px, evidence=evidence)
 
 
 def medoid(shapes: Array) -> int:

@@ -39,6 +39,6 @@ def test_a_summary_in_a_summary_is_told_field_by_field() -> None:
 def test_people_read_percent_and_four_digits(capsys: pytest.CaptureFixture[str]) -> None:
     Example(frames=3, out=None, scores=Scores(0.025), stages={"track": 1.23456}).print_table()
     table = capsys.readouterr().out
-    for text in ("modeshape", "2.50%", "track 1.235"):
+    for text in ("frames", "2.50%", "track 1.235"):
         assert text in table
     assert "out" not in table

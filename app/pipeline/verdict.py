@@ -1,0 +1,176 @@
+"""How good a reconstruction is, in a word, with the reason and what helps: thresholds on what is known without the truth.
+
+[docs/verdict.md](../../docs/verdict.md) has what the words were worth where the truth is known, and how it was measured.
+"""
+
+from array import array
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import Literal
+
+import numpy as np
+
+from app.arrays import Flags
+from reconstruction.estimate import ShapeEstimate
+from reconstruction.mapping.map import Map
+
+Grade = Literal["good", "fair", "poor"]
+GRADES: tuple[Grade, ...] = ("poor", "fair", "good")
+
+# Median distance of the points seen from the mesh's image, over the RMS radius of that image: 1 % of a sheet 300 px wide is
+# 1 px. Tracks of usual video leave 0.2 to 0.5 %, noisy ones 0.9 %, what the object is not 1.5 % and more.
+FAIR_ERROR, POOR_ERROR = 0.010, 0.018
+# Without a map of keyframes the model is a guess by the first frames, which fits what it was made from: less is allowed.
+POOR_GUESS = 0.005
+# What is not seen is a guess by its neighbours.
+FAIR_SHARE, POOR_SHARE = 0.5, 0.3
+# Change of a sheet's lengths from one half of its keyframes to the other: 0.7 % by noise alone. Where they really change
+# (a balloon, a crease between two points), or bend so much that noise hides them, no rest shape is right.
+FAIR_LENGTHS, POOR_LENGTHS = 0.02, 0.04
+TOSS_UP = 1.15  # factor by which the next best kind of object must leave more
+RECOVERED = ("rigid", "plane")  # by the first frames
+LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
+
+
+@dataclass
+class Course:
+    """What each frame with a shape tells of its quality; four numbers a frame.
+
+    Attributes:
+        frames: of the source.
+        errors: median residual over the RMS radius of the image.
+        errors_px: median residual.
+        shares: of the points seen.
+        lost: frames without the object.
+    """
+
+    frames: "array[int]" = field(default_factory=lambda: array("q"))
+    errors: "array[float]" = field(default_factory=lambda: array("f"))
+    errors_px: "array[float]" = field(default_factory=lambda: array("f"))
+    shares: "array[float]" = field(default_factory=lambda: array("f"))
+    lost: int = 0
+
+    def add(self, frame: int, estimate: ShapeEstimate) -> None:
+        """Add the estimate of a source frame."""
+        seen = estimate.residual_px[estimate.visible]
+        error_px = float(np.median(seen)) if len(seen) else np.inf
+        radius_px = float(np.sqrt(np.var(estimate.projection_px, axis=0).sum()))
+        self.frames.append(frame)
+        self.errors.append(error_px / max(radius_px, 1e-12))
+        self.errors_px.append(error_px)
+        self.shares.append(float(estimate.visible.mean()))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A word, the reason, and what helps."""
+
+    grade: Grade
+    reason: str
+
+    @property
+    def line(self) -> str:
+        """`poor: 4.5 px from frame 115 on; …`."""
+        return f"{self.grade}: {self.reason}"
+
+
+def verdict(course: Course, found: Map | None) -> Verdict:
+    """The verdict on shapes of frames.
+
+    Args:
+        course: what each frame tells.
+        found: what the object is taken for; None if there is no model.
+    """
+    if found is None or not course.frames:
+        return Verdict("poor", "there is no shape; the video is too short, or the surface has too little texture")
+    findings = [*errors(course, found), *seen(course)]
+    findings += evidence(found, known=bool(findings))
+    worst: Grade = next((grade for grade in GRADES if any(one.grade == grade for one in findings)), "good")
+    reasons = [one.reason for one in findings if one.grade == worst]
+    return Verdict(worst, "; ".join(reasons) or praise(course, found))
+
+
+def limits(poor: float, fair: float) -> list[tuple[Grade, float]]:
+    """The grades that are not good, worst first, and what separates them from the better ones."""
+    return [("poor", poor), ("fair", fair)]
+
+
+def praise(course: Course, found: Map) -> str:
+    """Why it is good."""
+    kind = {"isometric": "a sheet", "rigid": "a solid"}.get(found.rest.kind, "as given")
+    return f"{np.median(course.errors_px):.2g} px, {np.mean(course.shares):.0%} of the points seen, {kind} in many views"
+
+
+def errors(course: Course, found: Map) -> Iterator[Verdict]:
+    """What residuals say."""
+    off = np.asarray(course.errors)
+    fair, poor = (FAIR_ERROR, POOR_ERROR) if found.evidence else (POOR_GUESS / 2, POOR_GUESS)
+    for grade, limit in limits(poor, fair):
+        bad = np.asarray(off > limit)
+        if np.median(off) > limit or longest(bad)[1] >= LASTING * len(off):
+            yield Verdict(grade, f"{where(course, bad)}; {remedy(found)}")
+            return
+
+
+def where(course: Course, bad: Flags) -> str:
+    """`4.5 px from frame 115 on`."""
+    first, length = longest(bad)
+    last = first + length - 1
+    pixels = f"{np.median(np.asarray(course.errors_px)[bad]):.2g} px"
+    if bad.mean() > 1 - LASTING or not length:
+        return f"{pixels} off throughout"
+    if last == len(bad) - 1:
+        return f"{pixels} off from frame {course.frames[first]} on"
+    return f"{pixels} off in frames {course.frames[first]} to {course.frames[last]}"
+
+
+def longest(bad: Flags) -> tuple[int, int]:
+    """Where the longest stretch of bad frames begins, and its length."""
+    best, at = (0, 0), 0
+    for is_bad, run in groupby(bad.tolist()):
+        length = len(list(run))
+        if is_bad and length > best[1]:
+            best = at, length
+        at += length
+    return best
+
+
+def remedy(found: Map) -> str:
+    """What helps against errors."""
+    evidence = found.evidence
+    if evidence is None:
+        return "only the first frames say what it is: film it longer, turning or bending, and draw the region tightly"
+    if found.sheet is not None and evidence.solid.edges_px < evidence.sheet.edges_px * TOSS_UP:
+        return "looks like a turning solid; try --rest-shape rigid, or a tighter --roi"
+    return "more than one thing may move there; draw the region tightly: modeshape pick, --roi or --mask"
+
+
+def seen(course: Course) -> Iterator[Verdict]:
+    """What the share of points seen says."""
+    shares = np.asarray(course.shares)
+    share = float(shares.mean())
+    for grade, limit in limits(POOR_SHARE, FAIR_SHARE):
+        few = np.asarray(shares < limit)
+        if share < limit or longest(few)[1] > 2 * LASTING * len(few):
+            first, length = longest(few)
+            stretch = f"in frames {course.frames[first]} to {course.frames[first + length - 1]} " if length else ""
+            told = f"{stretch}less than {limit:.0%} of the points are seen; leave such frames out with --frames A:B"
+            yield Verdict(grade, told)
+            return
+    if course.lost > len(shares):
+        yield Verdict("fair", "the surface is out of sight most of the time; choose its frames with --frames A:B")
+
+
+def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
+    """What keyframes say; that there are none goes without saying where something worse is known."""
+    if found.evidence is None:
+        if found.rest.kind in RECOVERED and not known:
+            yield Verdict("fair", "it hardly turns or bends: depth is a guess; film it moving more, from near by")
+        return
+    lengths = found.evidence.length_change
+    for grade, limit in limits(POOR_LENGTHS, FAIR_LENGTHS):
+        if found.sheet is not None and lengths > limit:
+            told = f"its lengths change by {lengths:.1%} from view to view; it stretches, or is seen from too far away"
+            yield Verdict(grade, told)
+            return

@@ -1,0 +1,66 @@
+"""The verdict on a run, by what its frames and keyframes tell."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from app.pipeline.verdict import Course, longest, verdict
+from reconstruction.basis.rest_shape import RestShape, RigidMotion
+from reconstruction.camera import Camera
+from reconstruction.mapping.map import Map
+from reconstruction.mapping.selection import Evidence, Misfit
+
+REST = RestShape("rigid", RigidMotion(np.zeros((3, 9)), np.eye(3)[None], np.ones(1), np.zeros((1, 2))), "")
+LEFT = Misfit(0.3, 0.3)
+EVIDENCE = Evidence("solid", LEFT, LEFT, LEFT, 0.005, 2.0, 30.0, 0.3)
+SOLID = Map(REST, Camera(), evidence=EVIDENCE)
+
+
+def course(errors: list[float], shares: float = 1.0) -> Course:
+    made = Course()
+    for frame, error in enumerate(errors, 100):
+        made.frames.append(frame)
+        made.errors.append(error)
+        made.errors_px.append(100 * error)
+        made.shares.append(shares)
+    return made
+
+
+def test_all_is_well() -> None:
+    said = verdict(course([0.003] * 50), SOLID)
+    assert said.grade == "good"
+    assert "0.3 px" in said.reason
+
+
+def test_where_it_goes_wrong() -> None:
+    said = verdict(course([0.003] * 15 + [0.045] * 20), SOLID)
+    assert said.grade == "poor"
+    assert "4.5 px off from frame 115 on" in said.reason
+    assert "--roi" in said.reason
+    assert "in frames 115 to 124" in verdict(course([0.003] * 15 + [0.045] * 10 + [0.003] * 20), SOLID).reason
+    assert "throughout" in verdict(course([0.012] * 50), SOLID).reason
+
+
+def test_a_moment_is_no_matter() -> None:
+    assert verdict(course([0.003] * 50 + [0.045] * 2 + [0.003] * 50), SOLID).grade == "good"
+
+
+def test_nothing_known_but_the_first_frames() -> None:
+    said = verdict(course([0.001] * 50), replace(SOLID, evidence=None))
+    assert said.grade == "fair"
+    assert "film it" in said.reason
+
+
+@pytest.mark.parametrize(("share", "grade"), [(0.9, "good"), (0.4, "fair"), (0.2, "poor")])
+def test_what_is_not_seen_is_a_guess(share: float, grade: str) -> None:
+    assert verdict(course([0.003] * 50, share), SOLID).grade == grade
+
+
+def test_without_a_shape() -> None:
+    assert verdict(Course(), None).grade == "poor"
+
+
+def test_the_longest_stretch() -> None:
+    assert longest(np.array([True, False, True, True, False])) == (2, 2)
+    assert longest(np.zeros(3, bool)) == (0, 0)
