@@ -24,6 +24,7 @@ from reconstruction.window.terms import data_normal
 from reconstruction.window.uncertainty.uncertainty import Uncertainty
 
 ADJUST = Solver()
+TOGETHER = Solver(iterations=1)  # for all frames, once the newest is adjusted
 SHOW = Solver(tolerance=1e-2)  # for what is only shown: no later frame starts from it
 GUIDE = Solver(iterations=3)  # for the guides before it
 RELIABLE = 0.5  # weight above which a point counts for the pose of the first frame
@@ -96,15 +97,22 @@ class SlidingWindow:
         self._switch = None
         weights = start_weights(self._last_shape(), W, visible, self.model.radius_px)
         self._data.append(image_statistics(self.model, W, weights))
-        found = self._adjusted(self._started(W, weights))
+        window = self._started(W, weights)
+        found = self._newest(window)
+        if self._lost is not None:  # the better of that and the last frame's shape
+            found = min(found, self._newest(self._lost), key=lambda one: float(one.value[0]))
+            self._lost = None
         surprised = self._surprising(found)
         if surprised:
-            found = self._other_bends(found)
-        found = self._reweighted(found, W, visible, weights)
-        newest = float(found.value[-1])
+            found = self._other_bends(window, found)
+        window = with_newest(window, found.state)
+        if len(window) > 1:
+            window = minimise(self._energy, stack(self._data), window, self._before, TOGETHER).state
+        found = self._reweighted(window, found, W, visible, weights)
+        newest = float(found.value[0])
         # After a surprise the new level is the usual one: it is not asked about twice.
         self._usual = newest if surprised else running_mean(self._usual, newest)
-        self.state = found.state
+        self.state = with_newest(window, found.state)
         if self._energy.adaptive:
             self._weigh_rest(self.state[-1:])
         return replace(self._estimate(W, visible, self._as_shown(self.state)), switch=self._switch)
@@ -171,40 +179,33 @@ class SlidingWindow:
             self._shown = [energy.about(self._rest.rest) for energy in self._shown]
         return window[1:]
 
-    def _adjusted(self, start: State) -> Solution:
-        """The window adjusted, its newest frame first; after a restart, the better of that and the last frame's shape."""
-        found = self._adjust(with_newest(start, self._newest(self._energy, start)))
-        if self._lost is None:
-            return found
-        again, self._lost = self._adjust(self._lost), None
-        return min(found, again, key=lambda one: float(one.value.sum()))
-
     def _surprising(self, found: Solution) -> bool:
         """Whether the newest frame costs so much that the window may be on the wrong branch."""
         if self._energy.edges is None or self._usual is None:
             return False
         return bool(found.value[-1] > max(SURPRISE * self._usual, LEAST_SURPRISE))
 
-    def _other_bends(self, found: Solution) -> Solution:
+    def _other_bends(self, window: State, found: Solution) -> Solution:
         """The best of a solution and those with the newest frame undeformed or bent back at the start."""
         best = found
         for factors in OTHER_BENDS:
-            other = self._adjust(other_bend(best.state, factors, self._rest.rest))
-            if other.value.sum() < BENT_GAIN * best.value.sum():
+            bent = other_bend(best.state, factors, self._rest.rest)
+            other = self._newest(with_newest(window, bent))
+            if other.value[0] < BENT_GAIN * best.value[0]:
                 best = other
         self._switch = switch_between(found, best)
         return best
 
-    def _reweighted(self, found: Solution, W: Array, visible: Mask, weights: Array) -> Solution:
+    def _reweighted(self, window: State, found: Solution, W: Array, visible: Mask, weights: Array) -> Solution:
         """The newest frame adjusted again with robust weights by its residuals, until they hardly change."""
+        found = replace(found, state=window[-1:])
         for _ in range(REWEIGHTINGS):
             left = self.model.residuals(W, found.state) / self.model.radius_px
             before, weights = weights, robust_weights(left, visible)
             if np.abs(weights - before).sum() < REWEIGHTED * len(weights):
                 break
             self._data[-1] = image_statistics(self.model, W, weights)
-            newest = self._newest(self._energy, found.state)
-            found = replace(found, state=with_newest(found.state, newest), value=np.append(found.value[:-1], newest.value))
+            found = self._newest(with_newest(window, found.state))
         return found
 
     def _weigh_rest(self, newest: State) -> None:
@@ -218,7 +219,7 @@ class SlidingWindow:
         """The frames with the newest adjusted by the energies that follow the first guide, if there are guides."""
         for energy in self._shown:
             solver = SHOW if energy is self._shown[-1] else GUIDE
-            state = with_newest(state, self._newest(energy, state, solver))
+            state = with_newest(state, self._newest(state, energy, solver).state)
         return state
 
     def _estimate(self, W: Array, visible: Mask, state: State) -> ShapeEstimate:
@@ -229,19 +230,15 @@ class SlidingWindow:
         energy = self._shown[-1] if self._shown else self._energy
         return replace(estimate, sigma=self._uncertainty.sigma(energy, self._data[-1], state[-1:], W, visible))
 
-    def _adjust(self, start: State) -> Solution:
-        """The whole window adjusted."""
-        return minimise(self._energy, stack(self._data), start, self._before, ADJUST)
-
-    def _newest(self, energy: Energy, window: State, solver: Solver = ADJUST) -> Solution:
-        """The newest frame adjusted alone, which takes a fraction of the whole window's time."""
+    def _newest(self, window: State, energy: Energy | None = None, solver: Solver = ADJUST) -> Solution:
+        """The newest frame of a window adjusted alone, which takes a fraction of the whole window's time."""
         before = Previous(window[-2:-1]) if len(window) > 1 else self._before
-        return minimise(energy, self._data[-1], window[-1:], before, solver)
+        return minimise(energy or self._energy, self._data[-1], window[-1:], before, solver)
 
 
-def with_newest(window: State, newest: Solution) -> State:
-    """The window with another newest frame."""
-    return join([window[:-1], newest.state])
+def with_newest(window: State, newest: State) -> State:
+    """The window with another newest frame (n = 1)."""
+    return join([window[:-1], newest])
 
 
 def running_mean(mean: float | None, value: float) -> float:
