@@ -1,15 +1,22 @@
 """`modeshape run`: a video, frame by frame."""
 
+from typing import TYPE_CHECKING
+
 from app.options.run import Run
-from app.pipeline.session import Session
-from app.pipeline.summary import RunSummary
+from app.pipeline.stages.launched import Launched
 from app.terminal.progress import Progress
 
+if TYPE_CHECKING:
+    from app.pipeline.summary import RunSummary
 
-def run(command: Run, progress: Progress) -> RunSummary:
+
+def run(command: Run, progress: Progress) -> "RunSummary":
     """Reconstruct and record; returns the summary.
 
     Raises:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and what helps.
     """
-    return Session(command, progress).run()
+    with Launched(command.jobs) as launched:
+        from app.pipeline.session import Session  # it loads while the processes of the stages do
+
+        return Session(command, progress, launched=launched).run()

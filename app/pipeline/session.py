@@ -9,11 +9,13 @@ from typing import Literal
 
 from threadpoolctl import threadpool_limits
 
-from app.files.names import RECORDINGS, beside, free_name
+from app.files.names import RECORDINGS, free_name
 from app.files.writing import check_free
 from app.options.run import Run
 from app.pipeline.final_pass import final_pass
+from app.pipeline.parts import Parts
 from app.pipeline.processed import InOrder, Processed, Surface
+from app.pipeline.stages.launched import Launched
 from app.pipeline.stages.stages import Stages
 from app.pipeline.stages.tracking import LAG, Asked, Seen
 from app.pipeline.stopwatch import Stopwatch
@@ -36,6 +38,7 @@ class Session:
         config: what the person asked for.
         progress: where to report.
         record: whether a recording is written under a name of our own, too, if none is given.
+        launched: the stages' processes, if they have been begun already.
 
     Attributes:
         fps: announced rate of the video, once the frames have begun.
@@ -49,7 +52,8 @@ class Session:
 
     summary: RunSummary
 
-    def __init__(self, config: Run, progress: Progress, *, record: bool = True) -> None:
+    def __init__(self, config: Run, progress: Progress, *, record: bool = True, launched: Launched | None = None) -> None:
+        self._launched = launched
         self._config, self._progress, self._record_unnamed = config, progress, record
         for path in (config.output.out, config.output.tracks_out, config.output.shapes_out):
             check_free(path, overwrite=config.output.overwrite)
@@ -73,7 +77,11 @@ class Session:
         Raises:
             UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
         """
-        with threadpool_limits(1), Stages(self._config) as stages:
+        output = self._config.output
+        needed = bool(self._record_unnamed or output.out or output.connect or output.view)
+        self._wanted_again = needed or bool(output.shapes_out or self._config.ground_truth)
+        launched = self._launched or Launched(self._config.jobs, record=needed)
+        with threadpool_limits(1), launched, Stages(self._config, launched) as stages:
             self._tracking, self._begin_map, self.fps = stages.tracking, stages.begin_map, stages.tracking.opened.fps
             for _ in range(LAG):
                 self._tracking.send(Asked({0: None}))
@@ -81,14 +89,13 @@ class Session:
             if first is None or second is None:
                 raise UsageError(f"{self._config.source} gives only one frame: give a video, or more --frames")
             self._object = self._first_object = self._begun(first)
-            output = self._config.output
-            self._path = output.out or (free_name(RECORDINGS, self._config.source) if self._record_unnamed else None)
-            needed = bool(self._path or output.connect or output.view)
-            self._wanted_again = needed or bool(output.shapes_out or self._config.ground_truth)
+            path = output.out or (free_name(RECORDINGS, self._config.source) if self._record_unnamed else None)
             with stages.recording(needed=needed) as self._recording, self._progress:
                 self._watch.start()
                 self._progress.expect(self._tracking.opened.frame_count)
-                self._open_recording(first)
+                self._parts = Parts(self._recording, path, output)
+                self.recordings = self._parts.paths
+                self._parts.open(first.time_s, self._object.recording_options)
                 yield from self._objects(chain([first, second], iter(self._tracking.receive, None)))
 
     def _begun(self, seen: Seen) -> TrackedObject:
@@ -217,25 +224,15 @@ class Session:
         self._note(frame.index, frame.time_s, text, "WARN")  # where one ends and
         self._object, self._successor, self._surface = self._successor.found, None, None
         self._counts.objects += 1
-        self._open_recording(frame)
+        self._parts.open(frame.time_s, self._object.recording_options)
         self._recording.tell("event", frame.index, frame.time_s, text, "WARN")  # where the other begins
         self._begin_surface(frame.index, frame.time_s)
 
-    def _open_recording(self, frame: Seen) -> None:
-        """Write another recording from a frame on: the first, of another object, or the next part of a long one."""
-        self._opened_s = frame.time_s
-        path, part = self._path, len(self.recordings) + 1
-        if path is not None and part > 1:
-            path = beside(path, f"part{part}", overwrite=self._config.output.overwrite)
-        self.recordings += [path] if path else []
-        self._recording.tell("open", path, **self._object.recording_options)
-
     def _split_recording(self, frame: Seen) -> None:
         """Go on in another file, if it is time."""
-        minutes = self._config.output.split_minutes
-        if minutes and self._surface and frame.time_s - self._opened_s >= 60.0 * minutes:
+        if self._surface and self._parts.due(frame.time_s):
             self._recording.tell("summary", self._summary(self._object).as_dict())
-            self._open_recording(frame)
+            self._parts.open(frame.time_s, self._object.recording_options)
             self._recording.tell("rest", *self._surface.recorded)
 
     def _note(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from tempfile import TemporaryFile
 
 from app.environment import environment
 
@@ -45,3 +46,11 @@ def inherited_file(place: int) -> int:
     number = int(sys.argv[place])
     os.set_inheritable(number, False)
     return number
+
+
+def shared_file() -> int:
+    """A file without a name, to be passed on by its number: nothing of it is left when the last process has ended."""
+    if hasattr(os, "memfd_create"):
+        return os.memfd_create("modeshape")
+    with TemporaryFile() as file:
+        return os.dup(file.fileno())

@@ -4,15 +4,14 @@ import os
 import traceback
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from app.processes.child import child
 from app.terminal.errors import UsageError
 
 
 class Remote:
-    """A function in a process of its own: messages go there, answers come back in order; a context manager that ends it.
+    """A function in a process of its own: messages go there, answers come back in order; it runs until it is closed.
 
     Args:
         module: what the process runs: it has to `serve`.
@@ -51,10 +50,8 @@ class Remote:
         self._process.kill()
         self._process.wait()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def close(self) -> None:
+        """End the process, and the connection to it."""
         self.end()
         self._connection.close()
 

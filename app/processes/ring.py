@@ -3,7 +3,6 @@
 import mmap
 import os
 import time
-from tempfile import TemporaryFile
 
 import numpy as np
 
@@ -14,14 +13,6 @@ MOST_BYTES = 64 * 2**20
 FEWEST, MOST = 6, 32  # pictures; tracking is up to two ahead of the recording's newest
 PAUSE_S = 0.001
 ENDLESS = np.iinfo(np.int64).max
-
-
-def shared_file() -> int:
-    """A file without a name, to be passed on by its number: nothing of it is left when the last process has ended."""
-    if hasattr(os, "memfd_create"):
-        return os.memfd_create("modeshape")
-    with TemporaryFile() as file:
-        return os.dup(file.fileno())
 
 
 class Ring:

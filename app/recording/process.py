@@ -3,8 +3,8 @@
 import os
 import pickle
 import subprocess
-import sys
 from dataclasses import replace
+from multiprocessing.connection import Connection
 from queue import Queue
 from threading import Thread
 from types import TracebackType
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
 import numpy as np
 
-from app.processes.child import child, connection_to_parent, inherited_file
+from app.processes.child import connection_to_parent, inherited_file
 from app.processes.ring import Ring
 from app.terminal.errors import UsageError
 from tracking.video import Frame
@@ -118,21 +118,18 @@ class RecordingProcess:
     comes, also because the run was killed.
 
     Args:
-        needed: whether anything is written; without it there is no process, and nothing happens.
+        begun: the process and the connection to it; None writes nothing.
         pictures: where the pictures of frames are, if they are not told; each is released when it is written.
-        file: the `shared_file` of them.
     """
 
-    def __init__(self, *, needed: bool = True, pictures: Ring | None = None, file: int | None = None) -> None:
+    def __init__(self, begun: "tuple[subprocess.Popen[bytes], Connection] | None", pictures: Ring | None = None) -> None:
         self._error: BaseException | None = None
         self._waiting: Queue[Call | None] = Queue(MOST_WAITING)
         self._process: subprocess.Popen[bytes] | None = None
         self._pictures = pictures
-        if not needed:
-            if pictures is not None:
-                pictures.release_all()
+        if begun is None:
             return
-        self._process, self._connection = child("app.recording.process", *([] if file is None else [file]))
+        self._process, self._connection = begun
         self._sender = Thread(target=self._send, name="record", daemon=True)
         self._sender.start()
 
@@ -180,8 +177,7 @@ class RecordingProcess:
         """Send what waits; the first thing that goes wrong is kept for the run's own thread."""
         calls = iter(self._waiting.get, None)
         try:
-            if self._pictures is not None:
-                self._connection.send(self._pictures.size)
+            self._connection.send(self._pictures and self._pictures.size)
             for call in calls:
                 self._connection.send_bytes(pickle.dumps(call, protocol=5))
                 while self._connection.poll():
@@ -222,7 +218,8 @@ def main() -> None:
     recordings = Recordings()
     method = ""
     try:
-        pictures = Ring(inherited_file(2), connection.recv()) if len(sys.argv) > 2 else None
+        size = connection.recv()
+        pictures = Ring(inherited_file(2), size) if size else None
         while method != "leave":
             method, arguments, named, number = cast(Call, pickle.loads(connection.recv_bytes()))
             if pictures is not None and number is not None:

@@ -29,6 +29,8 @@ class Forked:
         return int(os.read(self._lifeline, 16))
 
     def kill(self) -> None:
+        if self._lifeline < 0:
+            return
         with suppress(ProcessLookupError):
             os.kill(self._pid, signal.SIGKILL)
 

@@ -15,8 +15,8 @@ NICE = 5  # frames go first
 class MapProcess:
     """Calls functions in another process, one after the other; a context manager that ends it, whatever it does."""
 
-    def __init__(self) -> None:
-        self._remote = Remote("app.pipeline.stages.maps", "makes the models")
+    def __init__(self, remote: Remote) -> None:
+        self._remote = remote
         self._calls = ThreadPoolExecutor(1, thread_name_prefix="map")  # sends, and waits for what comes back
 
     def begin(self, function: Callable[..., Any], *arguments: object) -> "Future[Any]":
@@ -27,9 +27,8 @@ class MapProcess:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        with self._remote:
-            self._remote.end()  # which ends a call that is waited for
-            self._calls.shutdown(cancel_futures=True)
+        self._remote.end()  # which ends a call that is waited for
+        self._calls.shutdown(cancel_futures=True)
 
     def _call(self, function: Callable[..., Any], *arguments: object) -> Any:
         self._remote.send((function, arguments))

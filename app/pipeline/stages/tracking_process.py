@@ -70,18 +70,15 @@ class TrackingProcess:
 
     Args:
         config: as for `TrackingStage`.
+        remote: the process.
         pictures: the `shared_file` that it writes pictures to.
     """
 
-    def __init__(self, config: Run, pictures: int) -> None:
-        self._remote = Remote("app.pipeline.stages.tracking_process", "follows the points", pictures)
-        try:
-            self._remote.send(config)
-            self.opened: Opened = self._remote.receive()
-            self.ring = Ring(pictures, self.opened.size)
-        except BaseException:
-            self._remote.__exit__(None, None, None)
-            raise
+    def __init__(self, config: Run, remote: Remote, pictures: int) -> None:
+        self._remote = remote
+        self._remote.send(config)
+        self.opened: Opened = self._remote.receive()
+        self.ring = Ring(pictures, self.opened.size)
 
     def send(self, asked: Asked) -> None:
         """Ask for another frame."""
@@ -101,7 +98,7 @@ class TrackingProcess:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        self._remote.__exit__(kind, error, trace)
+        self._remote.end()
 
 
 def main() -> None:

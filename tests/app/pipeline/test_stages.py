@@ -12,7 +12,8 @@ from app.options.model import Model
 from app.options.run import Output, Run
 from app.pipeline.session import Session
 from app.playback.playback import Playback
-from app.processes.ring import FEWEST, Ring, shared_file
+from app.processes.child import shared_file
+from app.processes.ring import FEWEST, Ring
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 

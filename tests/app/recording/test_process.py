@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from app.playback.playback import Playback
+from app.processes.child import child
 from app.recording.process import MOST_WAITING, RecordingProcess
 from app.terminal.errors import UsageError
 from tests.synthetic_run import SIZE, Run, verify, write_run
@@ -23,7 +24,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 def opened(path: Path, **options: object) -> RecordingProcess:
-    recording = RecordingProcess()
+    recording = RecordingProcess(child("app.recording.process"))
     recording.tell("open", path, configuration={}, size=SIZE, **options)
     return recording
 
@@ -81,7 +82,7 @@ def test_modules_that_lie_about_are_not_imported(tmp_path: Path, run: Run, monke
 
 
 def test_what_nobody_reads_needs_no_process(run: Run) -> None:
-    recording = RecordingProcess(needed=False)
+    recording = RecordingProcess(None)
     assert recording._process is None
     tell(recording, run)
     recording.close()

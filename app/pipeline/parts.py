@@ -1,0 +1,40 @@
+"""The files of a run's recording: one for each object, and of a long run one for so many minutes."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from app.files.names import beside
+from app.options.run import Output
+from app.recording.process import Recorder
+
+
+class Parts:
+    """Files that are written one after another.
+
+    Args:
+        recorder: writes them.
+        path: of the first; None writes none.
+        output: says when another is due.
+
+    Attributes:
+        paths: of the files so far.
+    """
+
+    def __init__(self, recorder: Recorder, path: Path | None, output: Output) -> None:
+        self._recorder, self._path, self._output = recorder, path, output
+        self.paths: list[Path] = []
+        self._opened_s = 0.0
+
+    def open(self, time_s: float, options: Mapping[str, object]) -> None:
+        """Go on in another file, with options as `Recording` takes them."""
+        self._opened_s = time_s
+        path, part = self._path, len(self.paths) + 1
+        if path is not None and part > 1:
+            path = beside(path, f"part{part}", overwrite=self._output.overwrite)
+        self.paths += [path] if path else []
+        self._recorder.tell("open", path, **options)
+
+    def due(self, time_s: float) -> bool:
+        """Whether it is time for another."""
+        minutes = self._output.split_minutes
+        return minutes is not None and time_s - self._opened_s >= 60.0 * minutes
