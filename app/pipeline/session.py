@@ -96,6 +96,7 @@ class Session:
                 self._parts = Parts(self._recording, path, output)
                 self.recordings = self._parts.paths
                 self._parts.open(first.time_s, self._object.recording_options)
+                self._recording.tell("region", first.index, first.time_s, first.begun(0).outline)
                 yield from self._objects(chain([first, second], iter(self._tracking.receive, None)))
 
     def _begun(self, seen: Seen) -> TrackedObject:

@@ -32,6 +32,10 @@ Every frame:
 - `timing/<stage>`: Scalars, milliseconds.
 - `events`: TextLog, when something happens.
 
+The first frame:
+
+- `world/camera/region`: LineStrips2D, borders of the region that the points are from, px.
+
 Every frame with a shape:
 
 - `world/mesh`: Mesh3D vertex_positions (p, 3) float32, camera axes, pixels of the first frame; with
@@ -57,6 +61,7 @@ WORLD = "world"
 MESH = "world/mesh"
 CAMERA = "world/camera"
 IMAGE = "world/camera/image"
+REGION = "world/camera/region"
 WIREFRAME = "world/camera/wireframe"
 SEEN = "world/camera/points/seen"
 PREDICTED = "world/camera/points/predicted"

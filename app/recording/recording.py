@@ -96,6 +96,8 @@ class Recording:
         if not self._stream.open:
             return
         self._stream.at(frame.index, frame.time_s)
+        if self._frames == 1:
+            self._stream.log(entities.REGION, rr.LineStrips2D([]))  # elsewhere by now
         if self._image == "jpeg":
             self._stream.log(entities.IMAGE, jpeg(frame.image))
         elif self._image == "video":
@@ -119,6 +121,11 @@ class Recording:
         self._frames += 1
         if self._frames % FLUSH_FRAMES == 0:
             self._stream.flush()
+
+    def region(self, index: int, time_s: float, outline: list[Array]) -> None:
+        """The borders (n, 2) px of the region that the points of a frame are from; they are shown in that frame."""
+        self._stream.at(index, time_s)
+        self._stream.log(entities.REGION, rr.LineStrips2D(outline))
 
     def rest(self, basis: ModalBasis, mesh: Mesh, camera: Camera, texture_bgr: Image, texture_px: Array) -> None:
         """A model, of the estimates that follow; `texture_px` (p, 2) are its vertices' pixels in `texture_bgr`."""

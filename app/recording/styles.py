@@ -37,6 +37,7 @@ def styles() -> Iterator[tuple[str, Loggable]]:
         # A negative radius is in points of the screen: the same size at every zoom.
         yield entity, rr.Points2D.from_fields(class_ids=k, radii=-2.0, draw_order=30 + k, show_labels=False)
     yield entities.WIREFRAME, rr.LineStrips2D.from_fields(colors=[WIREFRAME_RGBA], radii=-0.5, draw_order=20)
+    yield entities.REGION, rr.LineStrips2D.from_fields(colors=[PREDICTED_RGB], radii=-1.0, draw_order=25)
     # The viewer's pixels are squares between whole numbers; ours, like OpenCV's, have their centres there.
     yield entities.IMAGE, rr.Transform3D(translation=(-0.5, -0.5, 0.0))
     yield entities.ERROR, rr.SeriesLines(names=["RMS", "median"], colors=[LOST_RGB, PREDICTED_RGB])

@@ -6,7 +6,7 @@ from typing import cast
 import cv2
 import numpy as np
 
-from tracking import Image, TrackingError
+from tracking import Array, Image, TrackingError
 
 
 def region_mask(size: tuple[int, int], roi: tuple[int, int, int, int] | None = None, mask: Path | None = None) -> Image:
@@ -35,6 +35,15 @@ def region_mask(size: tuple[int, int], roi: tuple[int, int, int, int] | None = N
         where = f"{mask}" if roi is None else f"{mask} within the region {roi[0]} {roi[1]} {roi[2]} {roi[3]}"
         raise TrackingError(f"the mask is empty: {where} is black; paint the surface to follow white")
     return region
+
+
+def outline(region: Image) -> list[Array]:
+    """The borders of a region (H, W) uint8, closed, (n, 2) px each; none if it is the whole picture."""
+    if region.all():
+        return []
+    found = cv2.findContours(region, cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)[0]
+    smooth = [cv2.approxPolyDP(contour, 1.0, closed=True)[:, 0] for contour in found]
+    return [np.concatenate([line, line[:1]]).astype(np.float64) for line in smooth]
 
 
 def _read_mask(path: Path, size: tuple[int, int]) -> Image:

@@ -1,7 +1,7 @@
 """The stage that reads the source and follows points in it."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import cast, get_args
@@ -18,7 +18,7 @@ from reconstruction.settings import RecoveredRestShape
 from tracking import TrackingError
 from tracking.features import detect_corners
 from tracking.guarded import Change, Guarded, GuardedTracker
-from tracking.region.mask import region_mask
+from tracking.region.mask import outline, region_mask
 from tracking.video import Frame, Video
 
 LAG = 2  # frames between a frame and the first one whose tracking may know its shape: so many are on the way
@@ -54,9 +54,15 @@ class Asked:
 
 @dataclass(frozen=True)
 class Begun:
-    """An object begins: its points (P, 2) px."""
+    """An object begins.
+
+    Attributes:
+        points_px: (P, 2) its points.
+        outline: the borders of the region they are from, (n, 2) px each.
+    """
 
     points_px: Array
+    outline: list[Array] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -158,9 +164,10 @@ class TrackingStage:
             points_px = first_points(self._config, frame.image, self._region)
         except TrackingError as error:
             return error
+        begun = Begun(points_px, outline(self._region))
         self._region = region_mask(self.video.size, self._config.roi, self._config.mask)  # others may be anywhere in it
         self._trackers[one] = GuardedTracker(frame.image, points_px)
-        return Begun(points_px)
+        return begun
 
 
 def first_points(config: Run, image: Image, region: Image) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tracking import TrackingError
-from tracking.region.mask import region_mask
+from tracking.region.mask import outline, region_mask
 
 SIZE = (64, 48)
 
@@ -67,3 +67,13 @@ def test_masks_that_cannot_be_used(tmp_path: Path) -> None:
     for path, roi, says in table:
         with pytest.raises(TrackingError, match=re.escape(says.format(path))):
             region_mask(SIZE, roi, path)
+
+
+def test_the_outline_of_a_rectangle_is_closed_and_on_its_border() -> None:
+    (line,) = outline(region_mask(SIZE, (10, 20, 30, 28)))
+    np.testing.assert_array_equal(line[0], line[-1])
+    np.testing.assert_array_equal((line.min(axis=0), line.max(axis=0)), ((10, 20), (39, 47)))
+
+
+def test_the_whole_picture_has_no_outline() -> None:
+    assert outline(region_mask(SIZE)) == []
