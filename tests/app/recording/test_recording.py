@@ -10,7 +10,7 @@ import pytest
 
 from app.recording.recording import entities
 from reconstruction.camera import Camera
-from tests.app.recording.rows import Rows, read, record
+from tests.app.recording.rows import Rows, frame, read, record
 from tests.synthetic_run import MODES, SIZE, STAGE_MS, Run, verify, write_run
 from tracking.klt import Observation
 from tracking.video import Frame
@@ -127,6 +127,17 @@ def test_a_lost_surface_leaves_no_mesh_on_the_picture(tmp_path: Path) -> None:
     assert rows[entities.WIREFRAME, "LineStrips2D:strips"][1] == []
     assert rows[entities.PREDICTED, "Points2D:positions"][1] == []
     assert len(rows[entities.LOST, "Points2D:positions"][1]) == len(run.pixels)
+
+
+def test_the_outline_is_in_the_first_frame_only(tmp_path: Path) -> None:
+    path, line = tmp_path / "outline.rrd", np.array([[10.0, 10.0], [50.0, 12.0], [30.0, 40.0], [10.0, 10.0]])
+    with record(path) as recording:
+        recording.region(0, 0.0, [line])
+        for index in range(3):
+            recording.observe(*frame(index), phase="bootstrap")
+    strips = read(path)[entities.REGION, "LineStrips2D:strips"]
+    np.testing.assert_array_equal(strips[0], [line])
+    assert strips[1] == []
 
 
 def test_curves(run: Run, rows: Rows) -> None:
