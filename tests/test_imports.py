@@ -16,7 +16,7 @@ MOST_LINES, MOST_MODULES = 250, 12
 # What a room may import besides itself and what its package shares, which are the files right in it; app's rooms also
 # everything of `tracking` and `reconstruction`.
 SHOWN = {"app.files", "app.options", "app.terminal"}
-WORKED = SHOWN | {"app.painting", "app.pipeline", "app.playback", "app.recording"}
+WORKED = SHOWN | {"app.figures", "app.painting", "app.pipeline", "app.playback", "app.recording"}
 MEASURED = WORKED | {"app.demo", "app.rivals"}
 ARROWS = {
     "app.shared": set(),
@@ -26,7 +26,8 @@ ARROWS = {
     "app.options": {"app.files", "app.terminal"},
     "app.painting": SHOWN,
     "app.recording": SHOWN | {"app.processes"},
-    "app.playback": SHOWN | {"app.recording"},
+    "app.figures": {"app.recording"},
+    "app.playback": SHOWN | {"app.figures", "app.recording"},
     "app.pipeline": SHOWN | {"app.painting", "app.processes", "app.recording"},
     "app.demo": {"app.files", "app.terminal"},
     "app.synthetic": {"app.demo", "app.painting"},

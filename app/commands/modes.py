@@ -8,10 +8,10 @@ from typing import cast
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from app.figures.modes_figure import modes_figure, spectrum, title_of
 from app.files.writing import check_free, writable
 from app.options.evaluate import Evaluate
 from app.options.modes import Modes
-from app.recording.modes_figure import modes_figure, spectrum, title_of
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary
 from reconstruction.basis.distances import fitting

@@ -210,9 +210,9 @@ class Session:
         if last:
             self.summary = self._summary(self._first_object)
         self._recording.tell("summary", self._summary(self._object).as_dict())
-        if self._surface is not None:  # its figure would have slowed the run
+        if self._surface is not None:
             model = self._object.reconstruction.model
-            self._recording.tell("modes", model.basis, model.mesh, self._object.surface.metric)
+            self._recording.tell("modes", model.basis, model.mesh)
         self._object.save()
         if failed is not None:
             raise failed

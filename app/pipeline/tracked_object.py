@@ -124,6 +124,7 @@ class TrackedObject:
             "video": Path(self.config.source),
             "overwrite": output.overwrite,
             "keep_online": output.keep_online and self.config.passes,
+            "final_pass": self.config.passes,
         }
 
     def follow(self, seen: Begun | Guarded) -> Guarded:

@@ -10,7 +10,7 @@ from matplotlib.colors import AsinhNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from app.files.chart_style import STYLE
+from app.figures.chart_style import STYLE
 from app.playback.facts import phase_ranges
 from app.playback.measures import Reviewed
 from app.terminal.errors import UsageError

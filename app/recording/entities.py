@@ -1,9 +1,11 @@
 """What a recording contains: the one list that the writer, the blueprint and every reader share.
 
 Timelines: `frame` (number of the frame in its source, from 0) and `time` (seconds of the video); what is
-static has neither. A frame that is estimated again has several rows: the last one counts. p vertices, r
-modes, m triangles, n edges; matrices are flattened row by row; components of ours (`modeshape.…`) are
-float64 unless said otherwise.
+static has neither. A frame that is estimated again has several rows: the last one counts. A run with a final
+pass and without a viewer writes on the way the `estimate` of every frame, and what is drawn of it with the final
+pass, or at its end; one that was killed has the estimates, of which the rest follows. p vertices, r modes,
+m triangles, n edges; matrices are flattened row by row; components of ours (`modeshape.…`) are float64 unless
+said otherwise.
 
 Static:
 
@@ -14,10 +16,11 @@ Static:
 - `world/camera`: Pinhole with intrinsics and resolution, Transform3D; for perspective cameras only.
 - `world/camera/image`: Transform3D by half a pixel: everywhere here pixel centres are at whole numbers.
 - `model/<n>`: the n-th model, from 0: modeshape.Model with rest S̄ (3p), Upsilon Υ (rp), eigenvalues (r), Phi Φ (9),
-  faces (3m) and edges (2n) int64, strips int64 (see `wireframe`; −1 ends a strip), texture_px (2p) the vertices in the
+  faces (3m) and edges (2n) int32, strips int32 (see `wireframe`; −1 ends a strip), texture_px (2p) the vertices in the
   first frame, texture_origin (2) px of the crop in it, size (2) of the picture, perspective bool,
   focal_px, center_px (2).
-- `modes`: EncodedImage (JPEG), figure of the mode shapes; there when the run is complete.
+- `modes/<n>`: Mesh3D vertex_positions, triangle_indices, vertex_colors: the n-th mode, from 1, out of the plane, beside
+  the others; `modes/names`: Points3D, their labels. There when the run is complete.
 - `configuration`, `summary`: TextDocument for people; modeshape.Document with json and version for
   programs.
 

@@ -14,22 +14,23 @@ import rerun as rr
 from app.arrays import Array, Image, Indices
 from app.files.writing import check_free
 from app.recording import entities
+from app.recording.columns import Values, ours
+from app.recording.drawing import Shape, draw
 from app.recording.images import cropped, embedded_video, jpeg, texture
+from app.recording.modes import small_multiples
 from app.recording.stream import Stream
-from app.recording.styles import LEADING, coefficient_styles, placement, styles
-from app.recording.uncertainty import colors
+from app.recording.styles import coefficient_styles, model_components, placement, styles
 from app.recording.viewer import running_viewer, spawned_viewer
-from app.recording.wireframe import edge_strips, line_strips
+from app.recording.wireframe import NO_STRIPS, Strips
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.model import Model
 from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
-from reconstruction.settings import Metric
 from tracking.klt import Observation
 from tracking.video import Frame
 
-FLUSH_FRAMES = 100  # a full disk is noticed, and a killed run keeps all it wrote, to within so many frames
 NOWHERE = np.empty((0, 2))
 
 
@@ -46,6 +47,8 @@ class Recording:
         video: the source's file, for image="video".
         overwrite: replace an existing file.
         keep_online: keep the estimates from before the final pass beside those of it.
+        final_pass: whether a final pass is to come: a file alone is drawn then, and holds nothing twice; a run that is
+            killed leaves its estimates.
 
     Raises:
         UsageError: the file exists or cannot be written, no viewer answers, the video cannot be stored.
@@ -63,6 +66,7 @@ class Recording:
         video: Path | None = None,
         overwrite: bool = False,
         keep_online: bool = False,
+        final_pass: bool = False,
     ) -> None:
         self.path = path
         self._estimates = (entities.ESTIMATE, entities.ONLINE) if keep_online else (entities.ESTIMATE,)
@@ -71,8 +75,10 @@ class Recording:
         self._video_ns: Indices = np.empty(0, np.int64)
         self._frames = 0
         self._last_seen: Array = NOWHERE
-        self._strips: list[Indices] = []
-        self._camera = Camera()
+        self._lost_in: set[int] = set()
+        self._model: Model | None = None
+        self._textured: tuple[bytes, ...] | None = None
+        self._undrawn: dict[int, Shape] = {}
         self._placed = False
         self._stages: set[str] = set()
 
@@ -83,134 +89,115 @@ class Recording:
             check_free(path, overwrite=overwrite)
         if view:
             urls.append(spawned_viewer())
+        self._drawn_later = final_pass and not urls
         self._stream = Stream(path, urls)
         if path is not None:
             self._stream.name(path.stem)
         self._stream.document(entities.CONFIGURATION, "Configuration", configuration)
         self._stream.static(styles())
         if image == "video":
-            self._stream.log(entities.IMAGE, asset, static=True)
+            self._stream.log(entities.IMAGE, asset)
 
     def observe(self, frame: Frame, observation: Observation, *, phase: str) -> None:
         """A frame, its tracked points and the run's phase."""
         if not self._stream.open:
             return
-        self._stream.at(frame.index, frame.time_s)
-        if self._frames == 1:
-            self._stream.log(entities.REGION, rr.LineStrips2D([]))  # elsewhere by now
-        if self._image == "jpeg":
-            self._stream.log(entities.IMAGE, jpeg(frame.image))
-        elif self._image == "video":
-            nanoseconds = int(self._video_ns[min(frame.index, len(self._video_ns) - 1)])
-            self._stream.log(entities.IMAGE, rr.VideoFrameReference(nanoseconds=nanoseconds))
+        with self._stream.frame(frame.index, frame.time_s):
+            if self._frames == 1:
+                self._stream.row(entities.REGION, rr.LineStrips2D.columns, strips=NO_STRIPS)  # elsewhere by now
+            if self._image == "jpeg":
+                self._stream.row(entities.IMAGE, rr.EncodedImage.columns, **jpeg(frame.image))
+            elif self._image == "video":
+                nanoseconds = self._video_ns[[min(frame.index, len(self._video_ns) - 1)]]
+                self._stream.row(entities.IMAGE, rr.VideoFrameReference.columns_nanos, nanoseconds=nanoseconds)
 
-        points, visible = observation.points_px, observation.visible
-        if len(self._last_seen) != len(points):
-            self._last_seen = np.full_like(points, np.nan)
-        self._last_seen[visible] = points[visible]
-        self._stream.points(entities.SEEN, points[visible])
-        without_shape = not self._strips or phase.lower() == "lost"
-        lost = self._last_seen[~visible & np.isfinite(self._last_seen[:, 0])] if without_shape else NOWHERE
-        self._stream.points(entities.LOST, lost)
-        if self._strips and without_shape:  # the model's last word would stay on the picture
-            self._stream.points(entities.PREDICTED, NOWHERE)
-            self._stream.log(entities.WIREFRAME, rr.LineStrips2D([]))
-        self._stream.values(entities.OBSERVATION, "Observation", visible=visible, phase=phase)
-        if visible.size:
-            self._stream.log(entities.VISIBLE, rr.Scalars(visible.mean()))
-        self._frames += 1
-        if self._frames % FLUSH_FRAMES == 0:
-            self._stream.flush()
+            points, visible = observation.points_px, observation.visible.copy()
+            if len(self._last_seen) != len(points):
+                self._last_seen = np.full_like(points, np.nan)
+            self._last_seen[visible] = points[visible]
+            self._stream.points(entities.SEEN, points[visible])
+            without_shape = self._model is None or phase.lower() == "lost"
+            lost = self._last_seen[~visible & np.isfinite(self._last_seen[:, 0])] if without_shape else NOWHERE
+            self._stream.points(entities.LOST, lost)
+            if len(lost):
+                self._lost_in.add(frame.index)
+            if self._model and without_shape:  # the model's last word would stay on the picture
+                self._stream.points(entities.PREDICTED, NOWHERE)
+                self._stream.row(entities.WIREFRAME, rr.LineStrips2D.columns, strips=NO_STRIPS)
+            self._stream.row(entities.OBSERVATION, ours("Observation"), visible=visible, phase=[phase])
+            if visible.size:
+                self._stream.scalars(entities.VISIBLE, visible.mean())
+            self._frames += 1
 
     def region(self, index: int, time_s: float, outline: list[Array]) -> None:
         """The borders (n, 2) px of the region that the points of a frame are from; they are shown in that frame."""
-        self._stream.at(index, time_s)
-        self._stream.log(entities.REGION, rr.LineStrips2D(outline))
+        with self._stream.frame(index, time_s):
+            strips = rr.components.LineStrip2DBatch(outline).as_arrow_array()
+            self._stream.row(entities.REGION, rr.LineStrips2D.columns, strips=strips)
 
     def rest(self, basis: ModalBasis, mesh: Mesh, camera: Camera, texture_bgr: Image, texture_px: Array) -> None:
         """A model, of the estimates that follow; `texture_px` (p, 2) are its vertices' pixels in `texture_bgr`."""
         if not self._stream.open:
             return
-        self._strips = edge_strips(mesh.edges)
+        self._model, self._strips = Model(basis, mesh, camera), Strips(mesh.edges)
         crop, origin = cropped(texture_bgr, texture_px)
-        self._stream.values(
-            f"{entities.MODEL}/{self._models}",
-            "Model",
-            static=True,
-            rest=basis.rest.ravel(),
-            Upsilon=basis.Upsilon.ravel(),
-            eigenvalues=basis.eigenvalues,
-            Phi=basis.Phi.ravel(),
-            faces=mesh.faces.ravel(),
-            edges=mesh.edges.ravel(),
-            strips=np.concatenate([np.append(strip, -1) for strip in self._strips]),
-            texture_px=texture_px.ravel(),
-            texture_origin=origin,
-            size=np.array(self._size),
-            perspective=camera.perspective,
-            focal_px=camera.focal_px,
-            center_px=camera.center_px,
-        )
-        self._stream.log(entities.MESH, texture(crop, texture_px - origin, mesh.faces), static=True)
-        self._camera = camera
+        components = model_components(self._model, self._strips, self._size, texture_px, origin)
+        self._stream.values(f"{entities.MODEL}/{self._models}", "Model", **components)
+        shown = crop.tobytes(), texture_px.tobytes(), mesh.faces.tobytes()
+        if shown != self._textured:
+            self._stream.log(entities.MESH, texture(crop, texture_px - origin, mesh.faces))
+            self._textured = shown
         self._models += 1
         self._stream.static(coefficient_styles(len(basis.eigenvalues)))
 
     def final_pass(self) -> None:
         """The estimates that follow are of the final pass."""
-        self._estimates = (entities.ESTIMATE,)
+        self._estimates, self._drawn_later = (entities.ESTIMATE,), False
 
     def estimate(self, index: int, time_s: float, estimate: ShapeEstimate) -> None:
         """One frame's shape and pose."""
         if not self._stream.open:
             return
-        self._stream.at(index, time_s)
-        vertices, projection = estimate.shape.T, estimate.projection_px.astype(np.float32)
-        if not self._placed:
-            self._stream.static(placement(vertices, self._camera, self._size))
-            self._placed = True
-        known = {name: getattr(estimate, name) for name in ("quaternion", "t", "s", "visible")}
-        if estimate.sigma is not None:
-            known["sigma"] = estimate.sigma
-        for entity in self._estimates:
-            self._stream.values(entity, "Estimate", Lambda=estimate.Lambda.ravel(), model=self._models - 1, **known)
-        tint = colors(estimate.sigma, estimate.shape)
-        mesh = rr.Mesh3D.from_fields(vertex_positions=vertices.astype(np.float32), vertex_colors=tint)
-        self._stream.log(entities.MESH, mesh)
-        self._stream.log(entities.WIREFRAME, line_strips(projection, self._strips))
-        self._stream.points(entities.PREDICTED, projection[~estimate.visible])
-        self._stream.points(entities.LOST, NOWHERE)
-        residuals = estimate.residual_px[np.isfinite(estimate.residual_px)]
-        if residuals.size:
-            rms_and_median = [np.sqrt(np.mean(residuals**2)), np.median(residuals)]
-            self._stream.log(entities.ERROR, rr.Scalars(rms_and_median))
-        self._stream.log(entities.SPECTRUM, rr.BarChart.from_fields(values=estimate.Lambda.ravel()))
-        self._stream.log(entities.LEADING, rr.Scalars(estimate.Lambda[:, :LEADING].ravel()))
+        assert self._model is not None
+        with self._stream.frame(index, time_s):
+            if not self._placed:
+                self._stream.static(placement(estimate.shape.T, self._model.camera, self._size))
+                self._placed = True
+            known: dict[str, Values] = {name: getattr(estimate, name) for name in ("quaternion", "t", "visible")}
+            known |= {"s": np.array([estimate.s]), "Lambda": estimate.Lambda.ravel(), "model": np.array([self._models - 1])}
+            if estimate.sigma is not None:
+                known["sigma"] = estimate.sigma
+            for entity in self._estimates:
+                self._stream.row(entity, ours("Estimate"), **known)
+            if index in self._lost_in:
+                self._stream.points(entities.LOST, NOWHERE)
+                self._lost_in.remove(index)
+            shape = Shape.of(time_s, self._model, self._strips, estimate)
+            if self._drawn_later:
+                self._undrawn[index] = shape
+            else:
+                self._undrawn.pop(index, None)
+                draw(self._stream, shape)
 
     def timing(self, index: int, time_s: float, stage_ms: Mapping[str, float]) -> None:
         """Milliseconds that each stage took for one frame."""
-        self._stream.at(index, time_s)
-        for stage, milliseconds in stage_ms.items():
-            entity = f"{entities.TIMING}/{stage}"
-            if stage not in self._stages:
-                self._stages.add(stage)
-                self._stream.log(entity, rr.SeriesLines(names=stage), static=True)
-            self._stream.log(entity, rr.Scalars(milliseconds))
+        with self._stream.frame(index, time_s):
+            for stage, milliseconds in stage_ms.items():
+                entity = f"{entities.TIMING}/{stage}"
+                if stage not in self._stages:
+                    self._stages.add(stage)
+                    self._stream.log(entity, rr.SeriesLines(names=stage))
+                self._stream.scalars(entity, milliseconds)
 
     def event(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:
         """Something that happened, in words."""
-        self._stream.at(index, time_s)
-        self._stream.log(entities.EVENTS, rr.TextLog(text, level=level))
+        with self._stream.frame(index, time_s):
+            self._stream.row(entities.EVENTS, rr.TextLog.columns, text=[text], level=[level])
 
-    def modes(self, basis: ModalBasis, mesh: Mesh, metric: Metric) -> None:
-        """The figure of the mode shapes, which takes about a second to draw."""
-        if not self._stream.open:
-            return
-        from app.recording.modes_figure import modes_figure, spectrum, title_of  # matplotlib takes its time to load
-
-        name = self.path.stem if self.path else "the run"
-        figure = modes_figure(basis, mesh, spectrum(basis, mesh, metric), title=title_of(name, basis, metric), jpeg=True)
-        self._stream.log(entities.MODES, rr.EncodedImage(contents=figure, media_type="image/jpeg"), static=True)
+    def modes(self, basis: ModalBasis, mesh: Mesh) -> None:
+        """The first mode shapes, beside each other."""
+        if self._stream.open:
+            self._stream.static(small_multiples(basis, mesh))
 
     def summary(self, values: Mapping[str, object]) -> None:
         """What came out of the run."""
@@ -222,7 +209,13 @@ class Recording:
         Raises:
             UsageError: it could not be written.
         """
-        self._stream.close()
+        try:
+            for index, shape in self._undrawn.items():  # there was no final pass
+                with self._stream.frame(index, shape.time_s):
+                    draw(self._stream, shape)
+        finally:
+            self._undrawn = {}
+            self._stream.close()
         if self.path is not None and self._frames == 0:
             self.path.unlink(missing_ok=True)
 

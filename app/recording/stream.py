@@ -1,28 +1,26 @@
 """The channel a recording is written through: Rerun's stream to a file, to viewers, to both or to nothing."""
 
 import json
+import operator
 import shutil
-import subprocess
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from threading import Thread
 
 import numpy as np
 import rerun as rr
-import rerun_cli  # type: ignore[import-untyped]
-from numpy.typing import NDArray
 
-from app.environment import environment
-from app.files.writing import moved_when_complete
+from app.arrays import Array, Floats
 from app.recording import entities
 from app.recording.blueprint import blueprint
+from app.recording.columns import Columns, Kind, Values
 from app.terminal.errors import UsageError
 
 FLUSH_SECONDS = 10.0  # a viewer that hangs must not stop a run
-TICK_S = 1.0  # between two writes to the file: fewer, larger pieces; a killed run loses so much
-INDEXED_BYTES = 2 * 2**30  # larger recordings get no index: making it takes about twice as much memory
-INDEX_S = 600.0  # at most; it takes some seconds
+BATCH_ROWS = 30  # written together: a killed recorder loses so many frames
+VIEWED_SENDS = 100  # between two looks at the disk with a viewer, where everything is sent by itself
 FULL_BYTES = 2**20  # so little left on a disk explains a failure
 
 Loggable = rr.AsComponents | Iterable[rr.DescribedComponentBatch]
@@ -38,11 +36,14 @@ class Stream:
 
     def __init__(self, path: Path | None, urls: list[str]) -> None:
         self._path = path
+        self._columns, self._at = Columns(), (0, 0.0)
+        # A viewer wants everything at once.
+        self._batch, self._flushed_after = (1, VIEWED_SENDS) if urls else (BATCH_ROWS, 1)
+        self._sends = 0
         sinks: list[rr.FileSink | rr.GrpcSink] = [rr.GrpcSink(url) for url in dict.fromkeys(urls)]
         if path is not None:
-            sinks.append(rr.FileSink(path, write_footer=False))  # it would keep an index of all chunks in memory
-        batches = rr.ChunkBatcherConfig(flush_tick=TICK_S) if not urls else None  # a viewer wants every frame at once
-        self._stream = rr.RecordingStream(entities.APPLICATION, batcher_config=batches) if sinks else None
+            sinks.append(rr.FileSink(path))
+        self._stream = rr.RecordingStream(entities.APPLICATION) if sinks else None
         if self._stream is None:
             return
         try:
@@ -62,47 +63,55 @@ class Stream:
         if self._stream is not None:
             self._stream.send_recording_name(name)
 
-    def at(self, index: int, time_s: float) -> None:
-        """Everything but static data belongs to this frame from now on."""
-        if self._stream is not None:
-            self._stream.set_time(entities.FRAME, sequence=index)
-            self._stream.set_time(entities.TIME, duration=time_s)
+    @contextmanager
+    def frame(self, index: int, time_s: float) -> Iterator[None]:
+        """The rows that are written inside belong to this frame.
 
-    def log(self, entity: str, what: Loggable, *, static: bool = False) -> None:
-        """Write one of Rerun's archetypes."""
+        Raises:
+            UsageError: what was before could not be written.
+        """
+        self._at = operator.index(index), float(time_s)
+        yield
+        if self._stream is not None and self._columns.rows >= self._batch:
+            self._send(self._stream)
+            self._sends += 1
+            if self._sends % self._flushed_after == 0:  # a full disk is noticed
+                self._flush(self._stream)
+
+    def row(self, entity: str, kind: Kind, **values: Values) -> None:
+        """Write a row, soon: components by name, made into columns by `kind`."""
         if self._stream is not None:
-            self._stream.log(entity, what, static=static)
+            self._columns.add(entity, kind, *self._at, values)
+
+    def points(self, entity: str, points_px: Array | Floats) -> None:
+        """Write a row of points (n, 2) of the picture."""
+        self.row(entity, rr.Points2D.columns, positions=points_px.astype(np.float32))
+
+    def scalars(self, entity: str, *values: float) -> None:
+        """Write a row of numbers."""
+        self.row(entity, rr.Scalars.columns, scalars=np.array(values, np.float64))
+
+    def log(self, entity: str, what: Loggable) -> None:
+        """Write what holds for the whole recording."""
+        if self._stream is not None:
+            self._stream.log(entity, what, static=True)
 
     def static(self, entries: Iterable[tuple[str, Loggable]]) -> None:
-        """Write what holds for the whole recording."""
+        """Write several things that hold for the whole recording."""
         for entity, what in entries:
-            self.log(entity, what, static=True)
+            self.log(entity, what)
 
-    def values(self, entity: str, archetype: str, *, static: bool = False, **components: object) -> None:
-        """Write components of our own, at full precision; viewers do not draw them, programs read them."""
-        named = rr.DynamicArchetype(f"{entities.APPLICATION}.{archetype}", components=components)
-        self.log(entity, named, static=static)
-
-    def points(self, entity: str, points_px: NDArray[np.floating]) -> None:
-        """Write points (n, 2) of the picture."""
-        self.log(entity, rr.Points2D.from_fields(positions=points_px.astype(np.float32)))
+    def values(self, entity: str, archetype: str, **components: object) -> None:
+        """Write components of our own that hold for the whole recording."""
+        self.log(entity, rr.DynamicArchetype(f"{entities.APPLICATION}.{archetype}", components=components))
 
     def document(self, entity: str, title: str, values: Mapping[str, object]) -> None:
         """Write values by name, as a table for people and as JSON for programs."""
         release = version("modeshape")
         rows = [f"| {name} | {value} |" for name, value in values.items()]
         text = "\n".join([f"# {title}", f"modeshape {release}", "", "| | |", "|---|---|", *rows])
-        self.log(entity, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN), static=True)
-        self.values(entity, "Document", static=True, json=json.dumps(dict(values), default=str), version=release)
-
-    def flush(self) -> None:
-        """Wait until everything is on its way to the disk; a viewer that was closed meanwhile is no failure.
-
-        Raises:
-            UsageError: it could not be written.
-        """
-        if self._stream is not None:
-            self._flush(self._stream)
+        self.log(entity, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
+        self.values(entity, "Document", json=json.dumps(dict(values), default=str), version=release)
 
     def close(self) -> None:
         """Complete the file; without it, `rerun rrd verify` refuses it.
@@ -120,10 +129,14 @@ class Stream:
             Thread(target=stream.disconnect, daemon=True).start()
             raise
         stream.disconnect()
-        if self._path is not None:
-            index(self._path)
+
+    def _send(self, stream: rr.RecordingStream) -> None:
+        for piece in self._columns.taken():
+            rr.send_columns(piece.entity, piece.times, piece.columns, recording=stream)
 
     def _flush(self, stream: rr.RecordingStream) -> None:
+        """Wait until everything is on its way to the disk; a viewer that was closed meanwhile is no failure."""
+        self._send(stream)
         try:
             stream.flush(timeout_sec=FLUSH_SECONDS)
         except RuntimeError as error:
@@ -134,26 +147,3 @@ class Stream:
         full = self._path is not None and shutil.disk_usage(self._path.parent).free < FULL_BYTES
         reason = "the disk is full" if full else str(error)
         return UsageError(f"cannot write {self._path}: {reason}; choose another place with --out")
-
-
-def index(path: Path) -> None:
-    """Add the index that makes a recording quick to open, and pack it; a file left without is as good, only slower.
-
-    A process of its own reads the whole file for it, which is why that of very long recordings stays as it is.
-    """
-    program = Path(rerun_cli.__file__).with_name("rerun")
-    try:
-        if path.stat().st_size > INDEXED_BYTES or shutil.disk_usage(path.parent).free < path.stat().st_size + FULL_BYTES:
-            return
-        with moved_when_complete(path) as part:
-            subprocess.run(
-                [program, "rrd", "optimize", "--max-rows", "1", "--max-size", "1B", path, "-o", part],
-                env=environment(),
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                check=True,
-                timeout=INDEX_S,
-                start_new_session=True,  # Ctrl-C ends the run, not this
-            )
-    except (OSError, UsageError, subprocess.SubprocessError):
-        pass

@@ -1,13 +1,15 @@
-"""What a recording says once: colours, names and sizes of what is drawn, and where the scene stands."""
+"""What a recording says once: models, colours, names and sizes of what is drawn, and where the scene stands."""
 
 from collections.abc import Iterator
 
 import numpy as np
 import rerun as rr
 
-from app.arrays import Array
+from app.arrays import Array, Indices
 from app.recording import entities
 from app.recording.stream import Loggable
+from app.recording.wireframe import Strips
+from reconstruction.basis.model import Model
 from reconstruction.camera import Camera
 
 SEEN_RGB = (64, 224, 128)
@@ -73,3 +75,25 @@ def placement(vertices: Array, camera: Camera, size: tuple[int, int]) -> Iterato
                 image_plane_distance=0.25 * scale * camera.focal_px,
             ),
         )
+
+
+def model_components(
+    model: Model, strips: Strips, size: tuple[int, int], texture_px: Array, texture_origin: Indices
+) -> dict[str, object]:
+    """A model as programs read it, in the order of `entities`."""
+    basis, camera = model.basis, model.camera
+    return {
+        "rest": basis.rest.ravel(),
+        "Upsilon": basis.Upsilon.ravel(),
+        "eigenvalues": basis.eigenvalues,
+        "Phi": basis.Phi.ravel(),
+        "faces": model.mesh.faces.astype(np.int32).ravel(),
+        "edges": model.mesh.edges.astype(np.int32).ravel(),
+        "strips": np.concatenate([np.append(strip, -1) for strip in strips.strips]).astype(np.int32),
+        "texture_px": texture_px.ravel(),
+        "texture_origin": texture_origin,
+        "size": np.array(size),
+        "perspective": camera.perspective,
+        "focal_px": camera.focal_px,
+        "center_px": camera.center_px,
+    }

@@ -9,6 +9,7 @@ import rerun as rr
 from app.arrays import Floats, Indices
 
 STRIP = rr.components.LineStrip2DBatch([]).as_arrow_array().type
+NO_STRIPS = pa.array([], STRIP)
 
 
 def edge_strips(edges: Indices) -> list[Indices]:
@@ -36,10 +37,22 @@ def edge_strips(edges: Indices) -> list[Indices]:
     return open_strips + closed_strips
 
 
-def line_strips(points_px: Floats, strips: list[Indices]) -> rr.LineStrips2D:
-    """Strips through points (p, 2)."""
-    order = np.concatenate(strips)
-    # Rerun would convert strip by strip, which takes milliseconds.
-    points = pa.FixedSizeListArray.from_arrays(pa.array(points_px[order].ravel()), type=STRIP.value_type)
-    offsets = pa.array(np.cumsum([0, *map(len, strips)]), pa.int32())
-    return rr.LineStrips2D.from_fields(strips=pa.ListArray.from_arrays(offsets, points, type=STRIP))
+class Strips:
+    """The wireframe of a mesh.
+
+    Args:
+        edges: (n, 2) of the mesh.
+
+    Attributes:
+        strips: vertex indices of each strip.
+    """
+
+    def __init__(self, edges: Indices) -> None:
+        self.strips = edge_strips(edges)
+        self._order = np.concatenate(self.strips)
+        self._offsets = pa.array(np.cumsum([0, *map(len, self.strips)]), pa.int32())
+
+    def through(self, points_px: Floats) -> pa.Array:
+        """The strips through vertices (p, 2), as Rerun keeps them: converting them one by one takes milliseconds."""
+        points = pa.FixedSizeListArray.from_arrays(pa.array(points_px[self._order].ravel()), type=STRIP.value_type)
+        return pa.ListArray.from_arrays(self._offsets, points, type=STRIP)

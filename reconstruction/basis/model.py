@@ -71,16 +71,19 @@ class Model:
         s = self.scale * float(np.exp(state.log_s[row]))
         t = state.t[row] * self.radius_px
         Lambda = state.Lambda[row] * self.unit
-        if self.camera.perspective:
-            origin = np.array([t[0] / s, t[1] / s, self.camera.focal_px / s])
-            shape = R @ self.basis.deform(Lambda) + origin[:, None]
-        else:
-            shape = s * (R @ self.basis.deform(Lambda)) + np.array([*t, 0.0])[:, None]
+        shape = self.shape(R, t, s, Lambda)
         projection = self.projection(state, row)
         residual = np.where(visible, np.linalg.norm(np.where(visible, W - projection, 0.0), axis=0), np.nan)
         return ShapeEstimate(
             frame, quaternion_from_rotation(R), R, t, s, Lambda, shape, projection.T.copy(), residual, visible
         )
+
+    def shape(self, R: Array, t: Array, s: float, Lambda: Array) -> Array:
+        """The shape (3, p) in camera axes, units of the rest shape, of pose and Λ as a `ShapeEstimate` has them."""
+        if self.camera.perspective:
+            origin = np.array([t[0] / s, t[1] / s, self.camera.focal_px / s])
+            return np.asarray(R @ self.basis.deform(Lambda) + origin[:, None])
+        return np.asarray(s * (R @ self.basis.deform(Lambda)) + np.array([*t, 0.0])[:, None])
 
     def state_of(self, shape: Array, focal_px: float, seen: Mask, last: State | None) -> State:
         """Pose and Λ' (n = 1) with which the model comes nearest to a shape.

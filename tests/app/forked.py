@@ -62,8 +62,9 @@ def started(module: str, *files: int) -> Forked:
 
 
 def main() -> None:
+    from app.figures import modes_figure  # noqa: F401
     from app.pipeline.stages import maps, tracking_process  # noqa: F401
-    from app.recording import modes_figure, process, recording  # noqa: F401
+    from app.recording import process, recording  # noqa: F401
     from reconstruction.mapping import mapper  # noqa: F401
 
     asked = socket.socket(fileno=int(sys.argv[1]))

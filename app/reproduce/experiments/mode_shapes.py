@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from app.recording.modes_figure import modes_figure, spectrum, title_of
+from app.figures.modes_figure import modes_figure, spectrum, title_of
 from app.reproduce.chart import Panel, Series, charts
 from app.reproduce.experiment import Experiment
 from app.reproduce.experiments.basis_time import METRICS

@@ -8,7 +8,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from app.arrays import Array, Indices
-from app.recording.modes_figure import View
+from app.recording.modes import View
 from app.reproduce.experiments.organ import FRAMES_PER_BEAT, REST_FRAMES
 from reconstruction.camera import nearest_rotation
 from tracking.tracks import Tracks

@@ -13,7 +13,8 @@ from app.options.model import Model
 from app.options.run import Output, Run
 from app.pipeline.session import Session
 from app.playback.playback import Playback
-from app.recording.recording import FLUSH_FRAMES, Recording
+from app.recording.recording import Recording
+from app.recording.stream import BATCH_ROWS
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from reconstruction.basis.modes import modal_basis
@@ -30,12 +31,13 @@ KILLED = """
 import os, signal, sys
 from pathlib import Path
 import numpy as np
-from app.recording.recording import FLUSH_FRAMES, Recording
+from app.recording.recording import Recording
+from app.recording.stream import BATCH_ROWS
 from tracking.klt import Observation
 from tracking.video import Frame
 
 recording = Recording(Path(sys.argv[1]), configuration={"modes": 4}, size=(160, 120))
-for index in range(FLUSH_FRAMES + 5):
+for index in range(BATCH_ROWS + 5):
     points = np.full((5, 2), float(index))
     observation = Observation(points, np.ones(5, bool))
     recording.observe(Frame(index, index / 30, np.zeros((120, 160, 3), np.uint8)), observation, phase="bootstrap")
@@ -146,7 +148,7 @@ def test_killed_run(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", KILLED, path], cwd=ROOT, check=False)
     assert done.returncode == -9
     playback = Playback.load(path)
-    assert len(playback.frames) >= FLUSH_FRAMES
+    assert len(playback.frames) >= BATCH_ROWS
     assert playback.frames.tolist() == list(range(len(playback.frames)))
     assert playback.configuration == {"modes": 4}
     assert playback.summary is None

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.recording.wireframe import edge_strips, line_strips
+from app.recording.wireframe import Strips, edge_strips
 from reconstruction.basis.mesh import triangulate
 
 
@@ -19,8 +19,9 @@ def test_a_mesh_needs_few_strips() -> None:
     assert sum(map(len, edge_strips(edges))) < 1.15 * len(edges)
 
 
-def test_line_strips_keep_their_points() -> None:
-    points = np.array([[0, 0], [1, 2], [3, 4]], np.float32)
-    strips = line_strips(points, [np.array([0, 1, 2]), np.array([2, 0])]).strips
-    assert strips is not None
-    assert strips.as_arrow_array().to_pylist() == [[[0, 0], [1, 2], [3, 4]], [[3, 4], [0, 0]]]
+def test_strips_go_through_the_points() -> None:
+    points = np.array([[0, 0], [1, 2], [3, 4], [5, 6]], np.float32)
+    strips = Strips(np.array([[0, 1], [1, 2], [1, 3]]))
+    drawn = strips.through(points).to_pylist()
+    assert drawn == [points[strip].tolist() for strip in strips.strips]
+    assert len(drawn) == 2

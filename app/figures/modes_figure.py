@@ -1,6 +1,5 @@
 """The mode shapes of a rest shape as a figure (paper's Fig. 2): each mode along each principal axis, and the spectrum."""
 
-from dataclasses import dataclass
 from io import BytesIO
 
 import numpy as np
@@ -12,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from app.arrays import Array, Indices
+from app.recording.modes import MOVEMENT_RGB, View, brightness, displaced, normalised
 from reconstruction.basis.distances import dissimilarity
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.modes import ModalBasis, doubly_centred, exact_points
@@ -21,38 +21,13 @@ COLUMNS = 5
 DPI, SMALL_DPI = 150, 100
 PANEL_INCHES = 1.9
 LEFT, SPECTRUM, TOP, BOTTOM = 1.25, 4.1, 0.85, 0.4  # inches around the panels
-AMPLITUDE = 0.18  # largest displacement, as a share of the rest shape's length
-TURN_DEGREES, TILT_DEGREES = 32.0, 28.0  # of the view against the first frame's camera: neither frontal nor from the side
-LIGHT = np.array([-0.45, -0.65, -0.62])  # from the upper left, behind the eye
 AXES_WORDS = (
     ("$\\Gamma_\\alpha$", "in the plane,\nlengthwise"),
     ("$\\Gamma_\\beta$", "in the plane,\nacross"),
     ("$\\Gamma_\\tau$", "out of\nthe plane"),
 )
 INK, FAINT, GHOST = "#22262e", "#8a919e", "#b9bfca"
-MOVEMENT = LinearSegmentedColormap.from_list("movement", ["#2f6fb7", "#86b6e0", "#e9e7e2", "#f2a978", "#c8502d"])
-
-
-@dataclass(frozen=True)
-class View:
-    """A parallel projection onto the paper: rows of `axes` (3, 3) are its right, its down and away from the eye."""
-
-    axes: Array
-
-    @classmethod
-    def three_quarter(cls) -> "View":
-        """The first frame's camera, moved to the side and up."""
-        turn, tilt = np.deg2rad(TURN_DEGREES), np.deg2rad(TILT_DEGREES)
-        c, s = np.cos(turn), np.sin(turn)
-        about_y = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-        c, s = np.cos(tilt), np.sin(tilt)
-        about_x = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
-        return cls(about_x @ about_y)
-
-    def flat(self, shape: Array) -> Array:
-        """Points (p, 2) on paper, y up, of a shape (3, p)."""
-        right, down, _ = self.axes @ shape
-        return np.column_stack([right, -down])
+MOVEMENT = LinearSegmentedColormap.from_list("movement", MOVEMENT_RGB / 255)
 
 
 def spectrum(basis: ModalBasis, mesh: Mesh, metric: Metric) -> Array:
@@ -115,12 +90,6 @@ def modes_figure(
     return picture.getvalue()
 
 
-def displaced(basis: ModalBasis, axis: int, mode: int, length: float) -> Array:
-    """The rest shape (3, p) moved along a principal axis by a mode, as far as is well seen."""
-    values = basis.Upsilon[mode] / max(float(np.abs(basis.Upsilon[mode]).max()), 1e-12)
-    return np.asarray(basis.rest + AMPLITUDE * length * np.outer(basis.Phi[:, axis], values))
-
-
 def limits(basis: ModalBasis, view: View, length: float, columns: int) -> tuple[tuple[float, float], tuple[float, float]]:
     """What all panels show, so that their sizes can be compared."""
     shapes = [displaced(basis, axis, mode, length) for axis in range(3) for mode in range(columns)]
@@ -137,13 +106,12 @@ def draw_mode(
     faces, shape = mesh.faces, displaced(basis, axis, mode, length)
     points, rest = view.flat(shape), view.flat(basis.rest)
     lines(axes, rest[rim], GHOST, 0.9)
-    values = basis.Upsilon[mode] / max(float(np.abs(basis.Upsilon[mode]).max()), 1e-12)
-    colors = MOVEMENT(0.5 + 0.5 * values)
+    colors = np.asarray(MOVEMENT(0.5 + 0.5 * normalised(basis.Upsilon[mode])))
     colors[:, :3] *= brightness(shape, faces, view)[:, None]
     depth = (view.axes[2] @ shape)[faces].mean(axis=1)
     # A triangulation's order is the order it is painted in: the farthest first.
     surface = TriMesh(Triangulation(points[:, 0], points[:, 1], faces[np.argsort(-depth)]))
-    surface.set_facecolor(colors)
+    surface.set_facecolor(colors)  # type: ignore[arg-type]
     axes.add_collection(surface, autolim=False)
     lines(axes, points[mesh.edges], INK, 0.25, alpha=0.22)
     lines(axes, points[rim], INK, 0.6, alpha=0.7)
@@ -154,18 +122,6 @@ def lines(axes: Axes, ends: Array, color: str, width: float, alpha: float = 1.0)
     gaps = np.full((len(ends), 1, 2), np.nan)
     x, y = np.concatenate([ends, gaps], axis=1).reshape(-1, 2).T
     axes.plot(x, y, color=color, linewidth=width, alpha=alpha, solid_capstyle="butt", zorder=1)
-
-
-def brightness(shape: Array, faces: Indices, view: View) -> Array:
-    """Light (p,) from 0 to 1 on the vertices of a shape (3, p), the same on both sides of the surface."""
-    a, b, c = (shape[:, faces[:, k]] for k in range(3))
-    normals = np.cross((b - a).T, (c - a).T)  # as long as the triangle is large
-    at_vertices = np.zeros((shape.shape[1], 3))
-    for k in range(3):
-        np.add.at(at_vertices, faces[:, k], normals)
-    at_vertices /= np.linalg.norm(at_vertices, axis=1, keepdims=True).clip(1e-12)
-    light = view.axes.T @ (LIGHT / np.linalg.norm(LIGHT))
-    return np.asarray(0.42 + 0.58 * np.abs(at_vertices @ light))
 
 
 def boundary(faces: Indices) -> Indices:

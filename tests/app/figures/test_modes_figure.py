@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.recording.modes_figure import AMPLITUDE, View, boundary, brightness, displaced, modes_figure, spectrum
+from app.figures.modes_figure import boundary, modes_figure, spectrum
+from app.recording.modes import AMPLITUDE, View, brightness, displaced
 from reconstruction.basis.modes import ModalBasis, modal_basis
 from tests.synthetic_run import MODES, Run
 
@@ -44,7 +45,7 @@ def test_any_number_of_modes(run: Run, count: int, columns: int) -> None:
 
 
 def panel_px(basis: ModalBasis, columns: int) -> float:
-    from app.recording.modes_figure import PANEL_INCHES, limits
+    from app.figures.modes_figure import PANEL_INCHES, limits
 
     length = float(np.ptp(basis.Phi[:, 0] @ basis.rest))
     x, y = limits(basis, View.three_quarter(), length, min(columns, len(basis.eigenvalues)))

@@ -1,0 +1,75 @@
+"""What a viewer draws of a shape: mesh, wireframe, points that are not seen, curves. All of it follows from pose and Λ."""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from app.arrays import Array, Flags
+from app.recording import entities
+from app.recording.columns import Values
+from app.recording.stream import Stream
+from app.recording.styles import LEADING
+from app.recording.wireframe import Strips
+from reconstruction.basis.model import Model
+from reconstruction.basis.rest_shape import rms_radius
+from reconstruction.estimate import ShapeEstimate
+
+UNSURE = 0.05  # standard deviation over the shape's RMS radius at which a vertex is red; a sure one is white
+
+
+@dataclass(frozen=True)
+class Shape:
+    """An estimate without what follows from it and its model, to be drawn now or later.
+
+    Attributes:
+        time_s: of its frame.
+        model: what it is of.
+        strips: the wireframe of the model's mesh.
+        errors_px: (2,) RMS and median of the reprojection errors; (0,) if no point was seen.
+        others: those of a `ShapeEstimate`.
+    """
+
+    time_s: float
+    model: Model
+    strips: Strips
+    R: Array
+    t: Array
+    s: float
+    Lambda: Array
+    visible: Flags
+    sigma: Array | None
+    errors_px: Array
+
+    @classmethod
+    def of(cls, time_s: float, model: Model, strips: Strips, estimate: ShapeEstimate) -> Self:
+        """Of a frame's estimate."""
+        e, residuals = estimate, estimate.residual_px[np.isfinite(estimate.residual_px)]
+        errors = np.array([np.sqrt(np.mean(residuals**2)), np.median(residuals)] if residuals.size else [])
+        return cls(time_s, model, strips, e.R, e.t, e.s, e.Lambda, e.visible, e.sigma, errors)
+
+
+def draw(stream: Stream, shape: Shape) -> None:
+    """Write what shows the shape of the stream's frame."""
+    vertices = shape.model.shape(shape.R, shape.t, shape.s, shape.Lambda)
+    projection = shape.model.camera.project(vertices).T.astype(np.float32)
+    mesh: dict[str, Values] = {"vertex_positions": vertices.T.astype(np.float32)}
+    if shape.sigma is not None:
+        mesh["vertex_colors"] = colors(shape.sigma, vertices)
+    stream.row(entities.MESH, rr.Mesh3D.columns, **mesh)
+    stream.row(entities.WIREFRAME, rr.LineStrips2D.columns, strips=shape.strips.through(projection))
+    stream.points(entities.PREDICTED, projection[~shape.visible])
+    if shape.errors_px.size:
+        stream.scalars(entities.ERROR, *shape.errors_px)
+    spectrum = rr.components.TensorDataBatch(shape.Lambda.astype(np.float32).ravel()).as_arrow_array()
+    stream.row(entities.SPECTRUM, rr.BarChart.columns, values=spectrum)
+    stream.scalars(entities.LEADING, *shape.Lambda[:, :LEADING].ravel())
+
+
+def colors(sigma: Array, shape: Array) -> NDArray[np.uint32]:
+    """Colours (p,) 0xRRGGBBAA of the vertices (3, p) by their standard deviations (p,), to multiply a texture by."""
+    share = np.clip(sigma / (UNSURE * rms_radius(shape)), 0.0, 1.0)
+    other = np.round(255 * (1 - share)).astype(np.uint32)
+    return np.asarray(0xFF0000FF + (other << 16) + (other << 8), np.uint32)
