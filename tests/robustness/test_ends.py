@@ -22,7 +22,7 @@ def endless(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_video(tmp_path_factory.mktemp("endless") / "endless.mp4", list(turning(80)) * 30)
 
 
-def start(video: Path, folder: Path, limit: int | None = None) -> "subprocess.Popen[str]":
+def start(video: Path, folder: Path, *options: str, limit: int | None = None) -> "subprocess.Popen[str]":
     """A run in a process of its own, its files no larger than `limit` bytes."""
 
     def prepare() -> None:
@@ -32,7 +32,7 @@ def start(video: Path, folder: Path, limit: int | None = None) -> "subprocess.Po
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
     return subprocess.Popen(
-        [*PROGRAM, "run", str(video), *ARGUMENTS, "--json"],
+        [*PROGRAM, "run", str(video), *ARGUMENTS, "--json", *options],
         cwd=folder,
         env=ENVIRONMENT,
         stdout=subprocess.PIPE,
@@ -87,7 +87,7 @@ def test_a_full_disk_is_told_and_earlier_recordings_stay(endless: Path, tmp_path
     earlier = tmp_path / "run.rrd"
     earlier.rename(tmp_path / "earlier.rrd")
     before = (tmp_path / "earlier.rrd").read_bytes()
-    process = start(endless, tmp_path, limit=700_000)
+    process = start(endless, tmp_path, "--jobs", "1", limit=700_000)  # memory that processes share counts as a file
     _, err = process.communicate(timeout=120)
     assert process.returncode == 2, err
     assert "Traceback" not in err
