@@ -25,10 +25,10 @@ FAIR_ERROR, POOR_ERROR = 0.010, 0.018
 POOR_GUESS = 0.005
 # What is not seen is a guess by its neighbours.
 FAIR_SHARE, POOR_SHARE = 0.5, 0.3
-# Change of a sheet's lengths from one half of its keyframes to the other: 0.7 % by noise alone. Where they really change
-# (a balloon, a crease between two points), or bend so much that noise hides them, no rest shape is right.
-FAIR_LENGTHS, POOR_LENGTHS = 0.02, 0.04
-TOSS_UP = 1.15  # factor by which the next best kind of object must leave more
+# Lengths of a sheet that keeps them change by what noise makes of them, about as much as the median error; by twice that
+# where they really change (a balloon, a crease), and then no rest shape is right.
+FAIR_STRAIN = 1.75
+LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
 
@@ -85,7 +85,7 @@ def verdict(course: Course, found: Map | None) -> Verdict:
     if found is None or not course.frames:
         return Verdict("poor", "there is no shape; the video is too short, or the surface has too little texture")
     findings = [*errors(course, found), *seen(course)]
-    findings += evidence(found, known=bool(findings))
+    findings += evidence(course, found, known=bool(findings))
     worst: Grade = next((grade for grade in GRADES if any(one.grade == grade for one in findings)), "good")
     reasons = [one.reason for one in findings if one.grade == worst]
     return Verdict(worst, "; ".join(reasons) or praise(course, found))
@@ -105,8 +105,8 @@ def praise(course: Course, found: Map) -> str:
 def errors(course: Course, found: Map) -> Iterator[Verdict]:
     """What residuals say."""
     off = np.asarray(course.errors)
-    fair, poor = (FAIR_ERROR, POOR_ERROR) if found.evidence else (POOR_GUESS / 2, POOR_GUESS)
-    for grade, limit in limits(poor, fair):
+    guessed = found.evidence is None and found.rest.kind in RECOVERED
+    for grade, limit in limits(POOR_GUESS if guessed else POOR_ERROR, FAIR_ERROR):
         bad = np.asarray(off > limit)
         if np.median(off) > limit or longest(bad)[1] >= LASTING * len(off):
             yield Verdict(grade, f"{where(course, bad)}; {remedy(found)}")
@@ -141,8 +141,8 @@ def remedy(found: Map) -> str:
     evidence = found.evidence
     if evidence is None:
         return "only the first frames say what it is: film it longer, turning or bending, and draw the region tightly"
-    if found.sheet is not None and evidence.solid.edges_px < evidence.sheet.edges_px * TOSS_UP:
-        return "looks like a turning solid; try --rest-shape rigid, or a tighter --roi"
+    if found.sheet is not None and evidence.solid.edges_px < LIKE_A_SOLID * evidence.sheet.edges_px:
+        return "looks like a turning solid; try a tighter --roi, and frames in which it turns by 10° and more"
     return "more than one thing may move there; draw the region tightly: modeshape pick, --roi or --mask"
 
 
@@ -162,15 +162,13 @@ def seen(course: Course) -> Iterator[Verdict]:
         yield Verdict("fair", "the surface is out of sight most of the time; choose its frames with --frames A:B")
 
 
-def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
+def evidence(course: Course, found: Map, *, known: bool) -> Iterator[Verdict]:
     """What keyframes say; that there are none goes without saying where something worse is known."""
     if found.evidence is None:
         if found.rest.kind in RECOVERED and not known:
             yield Verdict("fair", "it hardly turns or bends: depth is a guess; film it moving more, from near by")
         return
-    lengths = found.evidence.length_change
-    for grade, limit in limits(POOR_LENGTHS, FAIR_LENGTHS):
-        if found.sheet is not None and lengths > limit:
-            told = f"its lengths change by {lengths:.1%} from view to view; it stretches, or is seen from too far away"
-            yield Verdict(grade, told)
-            return
+    usual = float(np.median(np.asarray(course.errors)))
+    if found.sheet is not None and found.sheet.strain_rms > FAIR_STRAIN * usual:
+        told = f"its lengths change by {found.sheet.strain_rms:.1%}, more than noise explains: it stretches, or has creases"
+        yield Verdict("fair", told)
