@@ -13,6 +13,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
@@ -20,13 +21,24 @@ from app.commands.batch_job import UNFINISHED, Job, carry_out
 from app.files.names import stem
 from app.files.writing import writable
 from app.options.batch import Batch
+from app.terminal.arguments import spelled_out
 from app.terminal.errors import UsageError
 from app.terminal.exit_code import ExitCode
 from app.terminal.progress import Progress
-from app.terminal.summary import Summary, in_words
+from app.terminal.summary import Summary
 
-COLUMNS = ("frames", "points", "rest_shape", "visible_share", "losses", "objects", "reprojection_rms_px", "fps")
-SHOWN = ("frames", "visible_share", "losses", "reprojection_rms_px", "fps")
+COLUMNS = (
+    "verdict",
+    "verdict_reason",
+    "frames",
+    "points",
+    "rest_shape",
+    "visible_share",
+    "losses",
+    "objects",
+    "reprojection_rms_px",
+    "fps",
+)
 CONNECT_S = 5.0
 
 
@@ -42,13 +54,26 @@ class Outcome(Summary):
     def print_table(self) -> None:
         """One row per video."""
         before = f", {self.skipped} done before" if self.skipped else ""
-        table = Table(title=f"{len(self.videos)} videos{before}", title_justify="left")
-        for column in ("video", *SHOWN, "result"):
-            table.add_column(column.replace("_", " "), overflow="fold")
+        table = Table(title=f"{len(self.videos)} videos{before}", title_justify="left", box=SIMPLE, padding=(0, 1, 0, 0))
+        table.add_column("video", overflow="fold", ratio=2)
+        for column in ("frames", "seen", "px"):
+            table.add_column(column, justify="right", no_wrap=True)
+        table.add_column("verdict", overflow="fold", ratio=5)
         for words in self.videos:
-            cells = ["" if words.get(name) is None else in_words(name, words[name]) for name in SHOWN]
-            table.add_row(str(words["name"]), *cells, f"FAILED: {words['error']}" if "error" in words else "ok")
-        Console().print(table)
+            share, error_px = words.get("visible_share"), words.get("reprojection_rms_px")
+            told = (
+                f"FAILED: {words['error']}"
+                if "error" in words
+                else f"{words.get('verdict')}: {words.get('verdict_reason')}"
+            )
+            table.add_row(
+                str(words["name"]),
+                str(words.get("frames", "")),
+                f"{share:.0%}" if isinstance(share, float) else "",
+                f"{error_px:.2f}" if isinstance(error_px, float) else "",
+                told,
+            )
+        Console().print(table, highlight=False, markup=False)
 
     @property
     def exit_code(self) -> ExitCode:
@@ -100,7 +125,8 @@ def make_jobs(command: Batch) -> list[Job]:
         (folder / UNFINISHED).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"cannot write to {folder}: {error.strerror}; choose another folder with --out") from error
-    videos = list(dict.fromkeys(v if "://" in v or v.isdigit() else str(Path(v).resolve()) for v in command.videos))
+    own = dict.fromkeys(map(whole, command.videos), ()) | (own_options(command.table) if command.table else {})
+    videos = list(own)
     stems = Counter(Path(video).stem for video in videos)
     at_a_time = command.jobs or os.cpu_count() or 1
     cores = 0 if command.scheduler else max(1, (os.cpu_count() or 1) // at_a_time)
@@ -108,11 +134,46 @@ def make_jobs(command: Batch) -> list[Job]:
     for video in videos:
         name = stem(video)
         digest = hashlib.sha256(video.encode()).hexdigest()[:8]
-        job = Job(video, name, folder, tuple(shlex.split(command.options)), cores)
+        job = Job(video, name, folder, (*shlex.split(command.options), *own[video]), cores)
         if stems[Path(video).stem] > 1 or (job.report.exists() and job.done() is None):
             job = Job(video, f"{name}-{digest}", folder, job.options, cores)
         found.append(job)
     return found
+
+
+def whole(video: str) -> str:
+    """A video as any process finds it."""
+    return video if "://" in video or video.isdigit() else str(Path(video).resolve())
+
+
+def own_options(path: Path) -> dict[str, tuple[str, ...]]:
+    """The videos of a table with their options: a column `video`, and one for each option.
+
+    Raises:
+        UsageError: it cannot be read, or has no such column.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = list(csv.DictReader(file, skipinitialspace=True))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise UsageError(f"--table {path} cannot be read: {error}") from error
+    if not rows or "video" not in rows[0]:
+        raise UsageError(f"--table {path} has no column video: begin it with a line like video,roi,frames")
+    found: dict[str, tuple[str, ...]] = {}
+    for row in rows:
+        given = {name: (cell or "").strip() for name, cell in row.items() if name and name != "video"}
+        options = [part for name, cell in given.items() if cell for part in option_of(name.strip(), cell)]
+        video = row["video"].strip()
+        found[whole(video if "://" in video else str(path.parent / video))] = tuple(options)
+    return found
+
+
+def option_of(name: str, cell: str) -> list[str]:
+    """An option of `run` as it is typed: `roi`, `1 2 3 4` as --roi 1 2 3 4."""
+    option = f"--{name.lstrip('-').replace('_', '-')}"
+    if cell.lower() in ("yes", "true", "no", "false"):
+        return [option if cell.lower() in ("yes", "true") else f"--no-{option[2:]}"]
+    return spelled_out([option, cell])
 
 
 def on_this_machine(jobs: list[Job], at_a_time: int | None) -> Iterator[tuple[Job, dict[str, object]]]:

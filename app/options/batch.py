@@ -19,11 +19,15 @@ class Batch(Json):
     Examples:
       modeshape batch clips/*.mp4 --jobs 4 --out recordings/clips
       modeshape batch a.mp4 b.mp4 --out both --options="--roi 195 95 325 265 --image none"
+      modeshape batch --table clips.csv --out recordings/clips
       modeshape batch /shared/*.mp4 --out /shared/out --scheduler tcp://10.0.0.1:8786
     """
 
-    videos: tyro.conf.Positional[tuple[str, ...]]
+    videos: tyro.conf.Positional[tuple[str, ...]] = ()
     """What `run` takes: video files, image patterns, URLs."""
+    table: Path | None = None
+    """Videos and their own options: a CSV file with a column `video` and one for each option, as `roi` or `frames`; empty
+    cells are left out, `yes` is a switch. Videos are looked for beside the table."""
     out: Path = Path("recordings/batch")
     """The folder."""
     jobs: int | None = None
@@ -36,8 +40,8 @@ class Batch(Json):
     """Address of a Dask scheduler (tcp://host:8786) whose workers do it; they need modeshape, and the same files."""
 
     def __post_init__(self) -> None:
-        if not self.videos:
-            raise UsageError("batch needs videos: modeshape batch a.mp4 b.mp4")
+        if not self.videos and self.table is None:
+            raise UsageError("batch needs videos: modeshape batch a.mp4 b.mp4, or --table clips.csv")
         if self.jobs is not None and self.jobs < 1:
             raise UsageError(f"--jobs {self.jobs} is too few: give 1 and more")
         if self.jobs is not None and self.scheduler is not None:

@@ -69,6 +69,23 @@ def test_failures_are_named_and_cost_only_themselves(modeshape: Command, four: l
     assert all(after[f"{name}.rrd"] == before[f"{name}.rrd"] for name in GOOD)
 
 
+@pytest.mark.usefixtures("four")
+def test_videos_of_a_table_have_options_of_their_own(modeshape: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    Path("clips", "clips.csv").write_text('video,roi,frames,no_search\na.mp4,"40, 30, 240, 180",:9,yes\nb.mp4,,:6,\n')
+    done = modeshape(
+        "batch", "--table", "clips/clips.csv", "--jobs", 2, "--out", "out", OPTIONS[0].replace("--frames :12 ", "")
+    )
+    assert done.code == 0, done.err
+    assert max(map(len, done.out.splitlines())) <= 80
+    assert done.out.count("fair: ") == 2
+    told = {name: json.loads(Path("out", f"{name}.json").read_text()) for name in GOOD}
+    assert [told[name]["frames"] for name in GOOD] == [9, 6]
+    wrong = modeshape("batch", "--table", "clips/text.mp4", "--out", "out")
+    assert wrong.code == 2
+    assert "--table clips/text.mp4" in wrong.err
+
+
 @pytest.mark.slow
 def test_two_dask_workers_write_the_same_files(modeshape: Command, four: list[Path]) -> None:
     distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install -e '.[cluster]'")
