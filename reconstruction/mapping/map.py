@@ -1,6 +1,7 @@
 """What the object is, by its keyframes: which kind of thing, its rest shape, its camera, and its shape in any frame."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -10,9 +11,8 @@ from reconstruction.basis.mesh import triangulate, unique_edges
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
-from reconstruction.mapping.isometric.adjustment import sheet
-from reconstruction.mapping.isometric.focal import focal, with_focal
-from reconstruction.mapping.isometric.halves import Halves
+from reconstruction.mapping.isometric.adjustment import by_part, sheet, with_focal
+from reconstruction.mapping.isometric.focal import focal
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, select
 from reconstruction.mapping.solid.freedom import modes_held
@@ -102,13 +102,12 @@ def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool, known:
         return None
     try:
         seen_by = lens(camera, W)
-        halves = Halves(W, visible, seen_by)
-        evidence = select(W, visible, camera, halves.shapes)
+        whole = cache(lambda: sheet(W, visible, seen_by))
+        evidence = select(W, visible, camera, lambda parts: [through(by_part(whole(), part), W[part]) for part in parts])
         if evidence.kind == "flat":
             return None
-        if evidence.kind == "sheet":  # before a long lens one half does not tell whether another is its mirror image
-            surface = halves.whole() if camera.perspective else sheet(W, visible, seen_by)
-            found = sheet_map(camera, surface, evidence, estimate_focal=estimate_focal)
+        if evidence.kind == "sheet":
+            found = sheet_map(camera, whole(), evidence, estimate_focal=estimate_focal)
         else:
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
@@ -116,6 +115,11 @@ def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool, known:
     if not (estimate_focal and camera.perspective):
         return found
     return replace(found, focal_note=f"focal length {found.camera.focal_px:.0f} px, from {len(W)} keyframes")
+
+
+def through(found: IsometricSheet, W: Array) -> tuple[Array, Array]:
+    """Shapes (K, 3, p) of a sheet in its keyframes, smooth, and through the points W (K, 2, p) px as they were seen."""
+    return found.shapes(), found.through(W)
 
 
 def lens(camera: Camera, W: Array) -> Camera:

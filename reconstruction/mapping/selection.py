@@ -27,8 +27,8 @@ from reconstruction.mapping.solid.solid import FEWEST_VIEWS, TAIL_SIGMAS, Solid,
 from reconstruction.window.robust import deviation
 
 Kind = Literal["flat", "solid", "sheet"]
-Surface = Callable[[list[Indices]], list[Array]]
-"""Shapes (n, 3, p) of a sheet of one metric for each of several parts of the keyframes; NaN for points left out."""
+Surface = Callable[[list[Indices]], list[tuple[Array, Array]]]
+"""Shapes (n, 3, p) of a sheet for each of several parts of the keyframes: smooth, and through the points as seen."""
 
 COMPARED = 80  # points
 RIGID_POINTS = 150  # enough to tell how well anything rigid fits
@@ -36,7 +36,8 @@ NEIGHBOURS = 6  # of each
 OFTEN = 0.8  # of the keyframes in which a point to compare is seen
 SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
 LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
-SHEET_FREEDOM = 1.2  # a sheet must leave so many times less than anything rigid
+SHEET_FREEDOM = 1.1  # a sheet must leave so many times less than anything rigid
+PLAIN = 2.0  # sureness with which one half of the keyframes is enough to test rigid shapes by
 SIGMAS = 1.1774  # median of a Rayleigh distribution
 HALF_NORMAL = 0.6745  # median of a half-normal one
 ROUNDS = 4  # of robust weights of a pose
@@ -54,6 +55,16 @@ class Misfit:
 
     edges_px: float
     whole_px: float
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """What a plane and a solid leave over, and the solid's turn and relief."""
+
+    flat: Misfit
+    solid: Misfit
+    turn_degrees: float
+    relief: float
 
 
 @dataclass(frozen=True)
@@ -105,67 +116,85 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     points = spread_points(W, visible)
     edges = spread_edges(W, visible, points[:COMPARED])
     few = np.unique(points)
-    at = np.searchsorted(few, edges)
     views = [(w[:, :, few], h[:, few]) for w, h in seen]
-    solids, planes = (
-        [bundle_adjust(w, h, camera, refine_focal=False, flat=flat) for w, h in views] for flat in (False, True)
-    )
-    solid, flat = (rigid_misfit(models, views, camera, at) for models in (solids, planes))
+    at = np.searchsorted(few, edges)
+    rigid = rigid_by(views[0], views[1], camera, at)
     sheet, change = Misfit(np.nan, np.nan), np.nan
     if surface is not None:
         with suppress(ReconstructionError):  # no sheet, then
             sheet, change = sheet_misfit(surface(halves), seen, edges)
-    turn, relief = (float(np.mean([getattr(one, name) for one in solids])) for name in ("turn_degrees", "relief"))
-    kind, sureness = decide(flat, solid, sheet, relief)
-    return Evidence(kind, flat, solid, sheet, change, sureness, turn, relief)
+    kind, sureness = decide(rigid, sheet)
+    if sureness < PLAIN:
+        rigid = both(rigid, rigid_by(views[1], views[0], camera, at))
+        kind, sureness = decide(rigid, sheet)
+    return Evidence(kind, rigid.flat, rigid.solid, sheet, change, sureness, rigid.turn_degrees, rigid.relief)
 
 
-def decide(flat: Misfit, solid: Misfit, sheet: Misfit, relief: float) -> tuple[Kind, float]:
+def decide(rigid: Rigid, sheet: Misfit) -> tuple[Kind, float]:
     """The kind, and how many times more the next best leaves.
 
     Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges.
     """
+    flat, solid = rigid.flat, rigid.solid
     gain = flat.whole_px / (SOLID_FREEDOM * solid.whole_px)
-    rigid: Kind = "solid" if gain > 1 and relief > LEAST_RELIEF else "flat"
-    rigid_px = solid.edges_px if rigid == "solid" else min(flat.edges_px, solid.edges_px)
+    best: Kind = "solid" if gain > 1 and rigid.relief > LEAST_RELIEF else "flat"
+    rigid_px = solid.edges_px if best == "solid" else min(flat.edges_px, solid.edges_px)
     sheet_px = SHEET_FREEDOM * sheet.edges_px
     if sheet_px < rigid_px:
         return "sheet", float(rigid_px / max(sheet_px, 1e-300))
     against_sheet = np.inf if np.isnan(sheet_px) else sheet_px / max(rigid_px, 1e-300)
-    return rigid, float(min(max(gain, 1 / gain), against_sheet))
+    return best, float(min(max(gain, 1 / gain), against_sheet))
 
 
-def rigid_misfit(models: list[Solid], seen: list[tuple[Array, Mask]], camera: Camera, edges: Indices) -> Misfit:
-    """Of rigid shapes of the two halves of the keyframes, each on the other half."""
+def rigid_by(made: tuple[Array, Mask], tested: tuple[Array, Mask], camera: Camera, edges: Indices) -> Rigid:
+    """A plane and a solid made from some keyframes, on others."""
+    solid, flat = (bundle_adjust(*made, camera, refine_focal=False, flat=flat) for flat in (False, True))
+    left = [rigid_misfit(model, *tested, camera, edges) for model in (flat, solid)]
+    return Rigid(left[0], left[1], solid.turn_degrees, solid.relief)
+
+
+def rigid_misfit(model: Solid, W: Array, visible: Mask, camera: Camera, edges: Indices) -> Misfit:
+    """Of a rigid shape on keyframes that it was not made from."""
     i, j = edges.T
-    single, between = [], []
-    for model, (W, visible) in zip(models, reversed(seen), strict=True):
-        off = np.where(visible[:, None], image_in(model, W, visible, camera) - W, 0.0)
-        both = visible[:, i] & visible[:, j]
-        between.append(np.median(np.linalg.norm(off[:, :, i] - off[:, :, j], axis=1)[both]) / SIGMAS / np.sqrt(2))
-        single.append(np.median(np.linalg.norm(off, axis=1)[visible]) / SIGMAS)
-    return Misfit(rms(between), rms(single))
+    off = np.where(visible[:, None], image_in(model, W, visible, camera) - W, 0.0)
+    seen = visible[:, i] & visible[:, j]
+    between = np.median(np.linalg.norm(off[:, :, i] - off[:, :, j], axis=1)[seen]) / SIGMAS / np.sqrt(2)
+    return Misfit(float(between), float(np.median(np.linalg.norm(off, axis=1)[visible]) / SIGMAS))
 
 
-def sheet_misfit(shapes: list[Array], seen: list[tuple[Array, Mask]], edges: Indices) -> tuple[Misfit, float]:
-    """Of sheets (K, 3, p) of the two halves of the keyframes, each on the other half; and the change of lengths.
+def both(one: Rigid, other: Rigid) -> Rigid:
+    """What was found on two halves of the keyframes, together."""
+    flat, solid = (
+        Misfit(rms([a.edges_px, b.edges_px]), rms([a.whole_px, b.whole_px]))
+        for a, b in ((one.flat, other.flat), (one.solid, other.solid))
+    )
+    return Rigid(flat, solid, (one.turn_degrees + other.turn_degrees) / 2, (one.relief + other.relief) / 2)
+
+
+def sheet_misfit(shapes: list[tuple[Array, Array]], seen: list[tuple[Array, Mask]], edges: Indices) -> tuple[Misfit, float]:
+    """Of sheets of the two halves of the keyframes, each on the other half; and the change of lengths.
+
+    Args:
+        shapes: (K, 3, p) smooth, and through the points seen, in each half.
+        seen: those points (K, 2, p) px, and their visibility (K, p).
+        edges: (n, 2).
 
     Raises:
         ReconstructionError: the sheets have no edge in common.
     """
-    known: Mask = np.asarray(np.isfinite(np.concatenate(shapes)).all(axis=(0, 1)))
-    i, j = edges[known[edges].all(axis=1)].T
-    if not i.size:
-        raise ReconstructionError("no edge is known in both halves of the keyframes")
-    logs = [np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)) for S in shapes]
+    i, j = edges.T
     pixels, changes = [], []
-    for made, tested, (W, visible) in zip(logs, reversed(logs), reversed(seen), strict=True):
-        change = tested - np.median(made, axis=0)
-        change = np.abs(change - np.median(change))
-        both = visible[:, i] & visible[:, j]
-        length = np.linalg.norm(W[:, :, i] - W[:, :, j], axis=1)
-        pixels.append(np.median((change * length)[both]) / HALF_NORMAL / np.sqrt(2))
-        changes.append(np.median(change[both]) / HALF_NORMAL)
+    for (made, _), (_, tested), (W, visible) in zip(shapes, reversed(shapes), reversed(seen), strict=True):
+        with np.errstate(divide="ignore"):
+            length, through = (np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)) for S in (made, tested))
+        change = through - medians(length, axis=0)
+        known = visible[:, i] & visible[:, j] & np.isfinite(change)
+        if not known.any():
+            raise ReconstructionError("no edge is known in both halves of the keyframes")
+        change = np.abs(change - np.median(change[known]))
+        size = np.linalg.norm(W[:, :, i] - W[:, :, j], axis=1)
+        pixels.append(np.median((change * size)[known]) / HALF_NORMAL / np.sqrt(2))
+        changes.append(np.median(change[known]) / HALF_NORMAL)
     return Misfit(rms(pixels), np.nan), rms(changes)
 
 

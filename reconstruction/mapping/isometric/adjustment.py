@@ -5,12 +5,14 @@ same in all keyframes. It needs a perspective camera; see `focal` in `sheet_evid
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from reconstruction import ReconstructionError
-from reconstruction.arrays import Array, Mask
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
+from reconstruction.mapping.isometric.convex import convex_finish, convex_start
 from reconstruction.mapping.isometric.lengths import (
     Edges,
     Solver,
@@ -20,29 +22,26 @@ from reconstruction.mapping.isometric.lengths import (
     robust_lengths,
     usual,
 )
-from reconstruction.mapping.isometric.max_depth import maximum_depth
-from reconstruction.mapping.isometric.nodes import NEIGHBOURS, Nodes, edges_between, nearest, neighbours, nodes_of, rays_of
+from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_of
 from reconstruction.mapping.isometric.sheet import IsometricSheet
-from reconstruction.mapping.isometric.smooth_field import smooth_field
-from reconstruction.mapping.isometric.warps import smooth_warps
+from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
+from reconstruction.mapping.isometric.warps import Warps, smooth_warps
 
 FUNCTIONS = 40
-START_NODES, START_FRAMES = 60, 15  # of the convex start
-START_STIFFNESS = 1e-3
-SEEN = 0.3  # weight of an edge that can be relied on
-ROUNDS = 3  # of starting frames again that do not fit
-OTHER_STARTS = 4
+START_FRAMES = 10  # of the convex start
+ROUNDS = 6  # at most, of starting frames again that do not fit
+OTHER_STARTS = 2
 FIRM_START = 100.0  # times the bending weight, before it is let go
 DOUBTFUL = 3.0  # times the usual change of length
-LITTLE_CHANGE = 0.003  # usual change of length, with which a start is good
+LITTLE_CHANGE = 0.006  # usual change of length, with which a start is good
+TORN = 2.5  # the worst edges' change over the usual one: strays spoil the start
+LITTLE_GAIN = 0.01  # of the change: a round that brought less is the last
+MOST_CHANGE = 0.02  # of lengths, rms: faces change by 0.027 to 0.036, sheets that hold by 0.003 to 0.013
 PART_LEFT_OUT = 0.4  # of the points
-DEEPEST = 1.0  # logarithm of a depth over the usual one, beyond which it says nothing: far from all points seen
 SOLVER = Solver()
 
 
-def sheet(
-    W: Array, visible: Mask, camera: Camera, rounds: int = ROUNDS, start: IsometricSheet | None = None
-) -> IsometricSheet:
+def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
     """The sheet that points W (F, 2, p) px with visibility (F, p) lie on, keyframes most different first.
 
     Points of something else show by distances that change, and count for little.
@@ -51,11 +50,9 @@ def sheet(
         W: anything where not visible.
         visible: (F, p).
         camera: its focal length is taken as it is.
-        rounds: how often frames that do not fit are started again.
-        start: the sheet in these frames to start from, if there is one.
 
     Raises:
-        ReconstructionError: the camera is orthographic, or there are fewer than 3 frames or 20 points.
+        ReconstructionError: the camera is orthographic, there are fewer than 3 frames or 20 points, or lengths change.
     """
     if not camera.perspective:
         raise ReconstructionError("a sheet's depths along its rays need a perspective camera")
@@ -67,16 +64,37 @@ def sheet(
     values = np.full((len(warps.placed), len(field.stiffness)), np.nan)
     values[warps.placed] = field.at(warps.reference[:, warps.placed])
     seen = edges_between(nodes, values, camera)
-    if start is None:
-        c = first_depths(nodes, seen, values[nodes.points], field.stiffness, camera)
-    else:
-        known = start.log_depths[:, nodes.points]
-        far = np.abs(known - np.nanmedian(known, axis=1, keepdims=True)) > DEEPEST
-        c = coefficients_of(np.where(far, np.nan, known), values[nodes.points], field.stiffness)
-    factor = np.ones(len(nodes.ends))
-    for _ in range(rounds):
-        c, factor = again(nodes, seen, seen.weighted(factor), c, field.stiffness)
-    edges = seen.weighted(factor)
+    c = first_depths(nodes, seen, values[nodes.points], field.stiffness, camera)
+    factor, change = np.ones(len(nodes.ends)), np.inf
+    for _ in range(ROUNDS):
+        c, factor = again(nodes, seen, seen.weighted(factor), c, values[nodes.points], field.stiffness, camera)
+        before, found = change, described(warps, nodes, field, values, c, factor, camera)
+        change = found.strain_rms
+        if change > (1 - LITTLE_GAIN) * before:
+            break
+    if change > MOST_CHANGE:
+        raise ReconstructionError(f"no sheet of one metric: lengths change by {change:.1%}")
+    return found
+
+
+def by_part(found: IsometricSheet, part: Indices) -> IsometricSheet:
+    """The sheet by some of its frames alone: depths and lengths adjusted anew from those there are."""
+    nodes = found.nodes.in_frames(part)
+    edges = edges_between(nodes, found.values, found.camera).weighted(found.edge_weights)
+    c = adjust_depths(edges, found.coefficients[part], found.field.stiffness, SOLVER)
+    return described(found.warps.in_frames(part), nodes, found.field, found.values, c, found.edge_weights, found.camera)
+
+
+def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:
+    """The same keyframes under another focal length, adjusted from the shapes there are, edges weighted as they are."""
+    return by_part(replace(found, camera=replace(found.camera, focal_px=focal_px)), np.arange(len(found.coefficients)))
+
+
+def described(
+    warps: Warps, nodes: Nodes, field: SmoothField, values: Array, c: Array, factor: Array, camera: Camera
+) -> IsometricSheet:
+    """The sheet of coefficients (F, r), with its lengths and how well they are kept."""
+    edges = edges_between(nodes, values, camera).weighted(factor)
     g = edges.log_lengths(c)
     logs = mean_log_lengths(edges, g)
     off = g - logs
@@ -89,12 +107,13 @@ def first_depths(nodes: Nodes, seen: Edges, B: Array, stiffness: Array, camera: 
     Points of something else at a border spoil the start: where lengths change much, others are tried, each from a part
     of the surface only.
     """
-    few, rest = slice(0, START_FRAMES), slice(START_FRAMES, None)
-    start = seen.frames(few)
+    frames = np.arange(len(nodes.images))
+    few, rest = frames[:START_FRAMES], frames[START_FRAMES:]
+    start, first = seen.frames(few), nodes.in_frames(few)
     c, least = np.zeros((0, 0)), np.inf
     for part in parts_of(nodes.reference):
         inside = start.weighted(np.asarray(part[nodes.ends].all(axis=1), np.float64))
-        tried = convex_start(nodes, part, start, B, stiffness, camera)
+        tried = convex_start(first, part, start, B, stiffness, camera)
         tried = adjust_depths(inside, tried, stiffness, Solver(bend=FIRM_START * SOLVER.bend))
         tried = adjust_depths(inside, tried, stiffness, SOLVER)
         tried = tried if part.all() else once_more(start, start, tried, stiffness)[0]
@@ -102,9 +121,10 @@ def first_depths(nodes: Nodes, seen: Edges, B: Array, stiffness: Array, camera: 
         change = usual(g - mean_log_lengths(start, g))
         if not len(c) or change < least:
             c, least = tried, change
-        if least < LITTLE_CHANGE:
+        by_edge = robust_lengths(start, g)[2]
+        if part.all() and (least < LITTLE_CHANGE or np.quantile(by_edge, 0.95) < TORN * np.median(by_edge)):
             break
-    if len(nodes.images) <= START_FRAMES:
+    if not len(rest):
         return c
     logs = robust_lengths(start, start.log_lengths(c))[0]
     alike = nearest(nodes.images[rest], nodes.images[few])
@@ -118,34 +138,9 @@ def parts_of(reference: Array) -> list[Mask]:
     return [np.ones(reference.shape[1], bool), *(np.asarray(side >= np.quantile(side, PART_LEFT_OUT)) for side in sides)]
 
 
-def convex_start(nodes: Nodes, part: Mask, edges: Edges, B: Array, stiffness: Array, camera: Camera) -> Array:
-    """Coefficients (F, r) of the deepest shapes of few nodes, of a part (m,) of them, in the frames of the edges."""
-    few = np.flatnonzero(part)[:START_NODES]
-    images = nodes.images[: len(edges.weights), :, few]
-    good = np.zeros((len(images), nodes.reference.shape[1]), bool)
-    frame, edge = np.nonzero(edges.weights > SEEN)
-    for end in edges.ends[edge].T:
-        good[frame, end] = True
-    ends = neighbours(images, NEIGHBOURS)
-    good = good[:, few]
-    depth = maximum_depth(rays_of(images, camera), ends, good[:, ends[:, 0]] & good[:, ends[:, 1]])
-    c = coefficients_of(np.log(depth), B[few], stiffness)
-    c[:, 0] -= c[:, 0].mean()
-    return c
-
-
-def coefficients_of(log_depths: Array, B: Array, stiffness: Array) -> Array:
-    """Coefficients (F, r) of log depths (F, m), NaN where not known, by the functions B (m, r) there."""
-    c = np.zeros((len(log_depths), len(stiffness)))
-    for f, logs in enumerate(log_depths):
-        known = np.isfinite(logs)
-        Bk = B[known]
-        held = Bk.T @ Bk / max(1, len(Bk)) + np.diag(START_STIFFNESS * stiffness + 1e-6)
-        c[f] = np.linalg.solve(held, Bk.T @ logs[known] / max(1, len(Bk)))
-    return c
-
-
-def again(nodes: Nodes, seen: Edges, edges: Edges, c: Array, stiffness: Array) -> tuple[Array, Array]:
+def again(
+    nodes: Nodes, seen: Edges, edges: Edges, c: Array, B: Array, stiffness: Array, camera: Camera
+) -> tuple[Array, Array]:
     """As `once_more`, frames that fell into another minimum started from others that did not, too.
 
     Raises:
@@ -158,6 +153,11 @@ def again(nodes: Nodes, seen: Edges, edges: Edges, c: Array, stiffness: Array) -
     alike = good[nearest(nodes.images, nodes.images[good])]
     starts = [np.tile(c[good].mean(axis=0), (len(c), 1))]
     starts += [c[alike[:, k]] for k in range(min(OTHER_STARTS, len(good)))]
+    stuck = np.flatnonzero(off > np.median(off))
+    if len(stuck):
+        deepest, some = c.copy(), nodes.in_frames(stuck)
+        deepest[stuck] = convex_finish(some, edges.frames(stuck), nodes.in_frames(good), c[good], B, stiffness, camera)
+        starts.append(deepest)
     return once_more(seen, edges, c, stiffness, starts)
 
 

@@ -1,19 +1,18 @@
 """The focal length under which a sheet keeps its lengths best."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from reconstruction.arrays import Array
-from reconstruction.mapping.isometric.adjustment import SOLVER
-from reconstruction.mapping.isometric.lengths import adjust_depths, mean_log_lengths, usual
-from reconstruction.mapping.isometric.nodes import edges_between
+from reconstruction.mapping.isometric.adjustment import by_part, with_focal
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 
 FACTORS = (0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8)  # of the focal length that are tried first
 CLOSER = (0.93, 1.0, 1.08)
 RISE = 1.5  # times the least change of length, to which it must rise on both sides
 ALIKE = 1.02  # times the least change of length, up to which the focal length assumed so far is as good
+FRAMES = 15  # those that differ most tell it
 ENOUGH = 1.1 * RISE  # ... and beyond which no focal length is tried on that side
 
 
@@ -34,41 +33,30 @@ class FocalSearch:
     strain_rms: Array
 
 
-def with_focal(sheet: IsometricSheet, focal_px: float) -> IsometricSheet:
-    """The same keyframes under another focal length, adjusted from the shapes there are, edges weighted as they are."""
-    camera = replace(sheet.camera, focal_px=focal_px)
-    edges = edges_between(sheet.nodes, sheet.values, camera).weighted(sheet.edge_weights)
-    c = adjust_depths(edges, sheet.coefficients, sheet.field.stiffness, SOLVER)
-    g = edges.log_lengths(c)
-    off = g - (logs := mean_log_lengths(edges, g))
-    return replace(
-        sheet, coefficients=c, log_lengths=logs, strain=edges.rms(off), change=usual(off), bend=SOLVER.bend, camera=camera
-    )
-
-
 def focal(sheet: IsometricSheet) -> FocalSearch:
     """Focal length by the change of length: least at the true one; the parabola through the three least, in log focal."""
-    tried: dict[float, float] = {}
+    tried: dict[float, IsometricSheet] = {}
 
     def look(focal_px: float, start: IsometricSheet) -> IsometricSheet:
-        found = with_focal(start, focal_px)
-        tried[focal_px] = found.strain_rms
-        return found
+        tried[focal_px] = with_focal(start, focal_px)
+        return tried[focal_px]
+
+    def best() -> IsometricSheet:
+        return min(tried.values(), key=lambda one: one.strain_rms)
 
     f, middle = sheet.camera.focal_px, FACTORS.index(1.0)
-    here = look(f, sheet)
+    here = look(f, by_part(sheet, np.arange(min(FRAMES, len(sheet.coefficients)))))
     for side in (FACTORS[middle + 1 :], FACTORS[:middle][::-1]):
         at = here  # outwards from the middle, each from the one before
         for factor in side:
             at = look(f * factor, at)
-            if at.strain_rms > ENOUGH * min(tried.values()):
+            if at.strain_rms > ENOUGH * best().strain_rms:
                 break
     for factor in CLOSER:
-        best = min(tried, key=lambda k: tried[k])
-        if best * factor not in tried:
-            look(best * factor, here)
+        if (focal_px := best().camera.focal_px * factor) not in tried:
+            look(focal_px, best())
     focals = np.array(sorted(tried))
-    strains = np.array([tried[k] for k in focals])
+    strains = np.array([tried[focal_px].strain_rms for focal_px in focals])
     k = int(strains.argmin())
     known = min(strains[:k].max(initial=0.0), strains[k + 1 :].max(initial=0.0)) > RISE * strains[k]
     if strains[focals == f][0] < ALIKE * strains[k]:

@@ -7,14 +7,15 @@ import scipy.sparse as sp
 from reconstruction.arrays import Array, Indices, Mask
 
 
-def maximum_depth(rays: Array, edges: Indices, seen: Mask) -> Array:
+def maximum_depth(rays: Array, edges: Indices, seen: Mask, lengths: Array | None = None) -> Array:
     """Depths (F, m) along rays (F, 3, m), up to one scale, such that no edge (n, 2) is ever longer than its length.
 
     The lengths d (n,) are unknown and the same in all frames. A second-order cone programme:
 
         max Σ μ_i^f |q_i^f| / m   subject to   ‖μ_i^f q_i^f − μ_j^f q_j^f‖ ≤ d_ij,   Σ d = n
 
-    An edge holds in the frames in which it is seen (F, n); a point without any comes out as NaN there.
+    An edge holds in the frames in which it is seen (F, n); a point without any comes out as NaN there. With lengths (n,)
+    given, d is those.
     """
     F, _, m = rays.shape
     unit = np.linalg.norm(rays, axis=1)
@@ -40,6 +41,8 @@ def maximum_depth(rays: Array, edges: Indices, seen: Mask) -> Array:
     b[0] = n
     goal = np.concatenate([held.ravel() * (-1.0 / m), np.zeros(n)])
     used = np.concatenate([held.ravel(), np.ones(n, bool)])
+    if lengths is not None:
+        b[0], b[base], used[F * m :] = 0.0, lengths[edge], False
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.max_threads = 1

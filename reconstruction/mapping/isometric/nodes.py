@@ -32,6 +32,10 @@ class Nodes:
     variance: Array
     ends: Indices
 
+    def in_frames(self, chosen: Indices) -> "Nodes":
+        """The same in some of the keyframes."""
+        return replace(self, images=self.images[chosen], variance=self.variance[chosen])
+
 
 def nodes_of(warps: Warps) -> Nodes:
     """Nodes of a sheet from its smooth images."""

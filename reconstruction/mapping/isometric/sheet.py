@@ -6,12 +6,14 @@ import numpy as np
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
+from reconstruction.mapping.isometric.convex import convex_finish
 from reconstruction.mapping.isometric.lengths import Edges, best_start, usual
 from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_in, rays_of
 from reconstruction.mapping.isometric.smooth_field import SmoothField
 from reconstruction.mapping.isometric.warps import Warps, quick_fit
 
 QUICK_STEPS = 4
+STUCK = 1.3  # times the usual frame's change of length: a frame that may be in another minimum
 
 
 @dataclass(frozen=True)
@@ -58,10 +60,14 @@ class IsometricSheet:
         """(F, 3, p) in camera axes, of all points, also those not visible; NaN for points that no keyframe shows."""
         return np.exp(self.log_depths)[:, None] * rays_of(self.warps.images(), self.camera)
 
+    def through(self, W: Array) -> Array:
+        """(F, 3, p) in camera axes as `shapes`, with the points where the keyframes W (F, 2, p) px saw them."""
+        return np.exp(self.log_depths)[:, None] * rays_of(W, self.camera)
+
     def finish(self, W: Array, visible: Mask, steps: int = 6) -> "IsometricSheet":
         """The sheet in other frames W (F, 2, p) px, each by itself, its lengths known.
 
-        Each starts from the two keyframes that look most alike; the better end is kept.
+        Each starts from the two keyframes that look most alike, and where both do badly from the deepest shape.
         """
         warps = self.warps.fit(W, visible)
         nodes = nodes_in(warps, self.nodes)
@@ -81,4 +87,10 @@ class IsometricSheet:
         edges = edges_between(nodes, self.values, self.camera).weighted(self.edge_weights)
         alike = nearest(nodes.images, self.nodes.images)[:, :2]
         starts = list(self.coefficients[alike].swapaxes(0, 1))
-        return best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, steps), edges
+        c = best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, steps)
+        stuck = np.flatnonzero(edges.rms(edges.log_lengths(c) - self.log_lengths) > STUCK * np.median(self.strain))
+        if len(stuck):
+            some, held, B = nodes.in_frames(stuck), edges.frames(stuck), self.values[nodes.points]
+            deepest = convex_finish(some, held, self.nodes, self.coefficients, B, self.field.stiffness, self.camera)
+            c[stuck] = best_start(held, self.log_lengths, [c[stuck], deepest], self.field.stiffness, self.bend, steps)
+        return c, edges

@@ -69,6 +69,16 @@ class Warps:
             out.append(sigma**2 * ((at @ inverse) * at).sum(axis=1))
         return np.array(out)
 
+    def in_frames(self, chosen: Indices) -> "Warps":
+        """Some of the images."""
+        return replace(
+            self,
+            coefficients=self.coefficients[chosen],
+            weights=self.weights[chosen],
+            inlier=self.inlier[chosen],
+            noise_px=self.noise_px[chosen],
+        )
+
     def fit(self, W: Array, visible: Mask) -> "Warps":
         """Smooth images of more frames W (F, 2, p) px."""
         return fitted(self, W, visible, self.firmness)

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
-from reconstruction.mapping.selection import Misfit, decide, select, spread_edges, spread_points
+from reconstruction.mapping.selection import Misfit, Rigid, decide, select, spread_edges, spread_points
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, SEEDS, flat, relief, rolled, seen, turns
 
 K, P = 16, 100
@@ -18,8 +18,8 @@ def keyframes(rng, shapes, camera=PERSPECTIVE, degrees=25.0, noise=0.2):
 
 
 def surface_of(placed, rng, off=0.3):
-    """What a good maker of sheets would find; `off` px."""
-    return lambda parts: [placed[part] + off * rng.normal(size=(len(part), 3, P)) for part in parts]
+    """What a good maker of sheets would find; seen `off` px beside it."""
+    return lambda parts: [(placed[part], placed[part] + off * rng.normal(size=(len(part), 3, P))) for part in parts]
 
 
 @given(SEEDS)
@@ -72,14 +72,15 @@ def test_orthographic_keyframes_are_told_without_a_sheet():
 
 @given(st.floats(0.01, 100))
 def test_what_leaves_least_wins_and_freedom_costs(unit):
-    def made(edges, whole=np.nan):
-        return Misfit(unit * edges, unit * whole)
+    def decided(flat, solid, sheet, relief=0.4):
+        made = [Misfit(unit * edges, unit * whole) for edges, whole in (flat, solid)]
+        return decide(Rigid(*made, 30.0, relief), Misfit(unit * sheet, np.nan))[0]
 
-    assert decide(made(1, 1), made(1, 0.95), made(0.9), 0.4)[0] == "flat"
-    assert decide(made(1, 2), made(0.5, 1), made(0.48), 0.4)[0] == "solid"
-    assert decide(made(1, 2), made(0.5, 1), made(0.48), 0.01)[0] != "solid"
-    assert decide(made(1, 2), made(0.5, 1), made(0.2), 0.4)[0] == "sheet"
-    assert decide(made(1, 2), made(0.5, 1), made(np.nan), 0.4)[0] == "solid"
+    assert decided((1, 1), (1, 0.95), 0.95) == "flat"
+    assert decided((1, 2), (0.5, 1), 0.48) == "solid"
+    assert decided((1, 2), (0.5, 1), 0.48, relief=0.01) != "solid"
+    assert decided((1, 2), (0.5, 1), 0.2) == "sheet"
+    assert decided((1, 2), (0.5, 1), np.nan) == "solid"
 
 
 def test_edges_join_neighbours_seen_often():

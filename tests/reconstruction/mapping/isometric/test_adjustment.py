@@ -114,3 +114,17 @@ def test_what_cannot_be_done_is_said() -> None:
         sheet(W, SEEN, Camera())
     with pytest.raises(ReconstructionError, match="3 keyframes"):
         sheet(W[:2], SEEN[:2], CAMERA)
+
+
+def test_frames_in_another_minimum_are_found_again() -> None:
+    W, S, found = waving()
+    wrong = replace(found, coefficients=np.flip(found.coefficients, axis=0))  # every frame would start badly
+    assert error(wrong.finish(W, SEEN), S) < 0.03
+
+
+def test_what_stretches_is_no_sheet() -> None:
+    rng = np.random.default_rng(7)
+    W, _ = waving_sheet(rng, frames=15)
+    W = W + 6 * np.sin(W[:, ::-1] / 20 + rng.uniform(0, 6, (15, 1, 1)))
+    with pytest.raises(ReconstructionError, match="lengths change"):
+        sheet(W, np.ones((15, 150), bool), CAMERA)
