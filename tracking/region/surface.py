@@ -12,8 +12,8 @@ from tracking.region.groups import groups_of
 
 STILL_PX = 2.0  # a group that moves less does not move
 BESIDE = 8  # points of the surface that say where a point beside them should go
-STRAY_PX = 3.0  # a point that is no farther off is not of something else
-SHARED = 0.5  # of its motion all that is on it shares: a lip or an eyelid, too
+STRAY_PX = 3.0  # a point no farther from where the surface would carry it is not of something else, and ...
+SHARED = 0.5  # ... one that goes so much of its way: a lip or a chin goes farther, what is behind stays
 SPACING = 3  # the neighbour whose distance is the usual one
 REACH = 1.0  # times the usual distance between points on it, that the surface goes on beyond them
 GAP = 2.0  # the same: narrower gaps between its parts are its own
@@ -61,7 +61,7 @@ def surface_of(W: Array, group: Flags, grouped: Flags, region: Image) -> Surface
     off, carried, way = astray_px(W, group)
     own = group & (way > SHARED * carried)  # else it was not seen when the others moved
     motion = float(np.median(way[own]))
-    other = ~group & (grouped | (off > max(STRAY_PX, SHARED * motion)))
+    other = ~group & (grouped | ((off > STRAY_PX) & (way < SHARED * carried)))
     doubtful = ~own & ~other & ~region.all()  # in a region that somebody chose, points that were lost are as good
     return Surface(surface_mask(W[0], own | doubtful, other, region), own, other, motion)
 
