@@ -98,9 +98,3 @@ def nearest_rotation(M: Array) -> Array:
     sign = np.linalg.det(U @ Vt)
     U = np.concatenate([U[..., :2], U[..., 2:] * sign[..., None, None]], axis=-1)
     return U @ Vt
-
-
-def tilt_axes(directions: int = 4) -> Array:
-    """(n, 3) unit rotation axes in the image plane, evenly spread."""
-    angle = 2 * np.pi * np.arange(directions) / directions
-    return np.stack([np.cos(angle), np.sin(angle), np.zeros(directions)], axis=1)

@@ -16,7 +16,7 @@ from reconstruction.mapping.map import Map, ratio_of_sizes
 from reconstruction.mapping.mapper import Mapper
 from reconstruction.settings import Deformation, Metric, Settings
 from reconstruction.window import priors
-from reconstruction.window.energy import build_energy, build_guides
+from reconstruction.window.energy import build_energy, build_guide
 from reconstruction.window.priors import Weights
 from reconstruction.window.window import SlidingWindow
 
@@ -206,15 +206,15 @@ class Reconstruction:
         model = build_model(rest, self.camera, modes, self.metric, self._mesh)
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
-        refine = self.settings.refine_rest and not paper and rest.kind != "isometric"
-        guides = build_guides(model, self.deformation, paper=paper)
+        keeps_lengths = self.deformation in ("bending", "inextensible")
+        refine = self.settings.refine_rest and keeps_lengths and not paper and rest.kind != "isometric"
         self.window = SlidingWindow(
             model,
             energy,
             self.settings.window,
             rest.motion,
             refine=refine,
-            guides=guides,
+            guide=build_guide(model, self.deformation, paper=paper),
             uncertainty=self.settings.uncertainty,
         )
         if before is not None and last is not None:

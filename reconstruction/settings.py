@@ -43,7 +43,7 @@ class Settings:
     """Weights of the energy's priors instead of its own, 0 for none: rest, smoothness, rotation, scale,
     inextensibility."""
     refine_rest: bool = True
-    """Let later frames improve the rest shape. Not with the paper's energy."""
+    """Let later frames improve the rest shape of a sheet. Not with the paper's energy."""
     uncertainty: bool = False
     """Estimate a standard deviation for each vertex of each frame, too."""
     estimate_focal: bool = False

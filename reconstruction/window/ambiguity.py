@@ -16,7 +16,6 @@ from reconstruction.camera import (
     quaternion_from_rotation,
     quaternion_product,
     rotation_from_quaternion,
-    tilt_axes,
 )
 from reconstruction.estimate import SAME_BEND, SAME_TILT_DEGREES, Switch
 from reconstruction.state import State
@@ -24,8 +23,6 @@ from reconstruction.window.energy import pose_energy
 from reconstruction.window.solver import Solution, Solver, minimise
 from reconstruction.window.statistics import image_statistics
 
-TILT_GAIN = 0.7  # another tilt must cost less than this share, be it energy or reprojection error
-FIRST_TILT = 0.3  # radians by which the first frame is tilted to look for a better pose
 FACING = 0.05  # radians within which a shape's main plane faces the camera
 LEAN = 0.1  # radians by which it is tilted then
 OTHER_BENDS = (np.zeros((3, 1)), np.array([[1.0], [1.0], [-1.0]]))  # factors on the rows of Λ: undeformed, bent back
@@ -42,8 +39,8 @@ def switch_between(left: Solution, found: Solution) -> Switch | None:
     return Switch(bend, turned, float(found.value.sum() / left.value.sum()))
 
 
-def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask) -> tuple[State, Switch | None]:
-    """Pose of the first frame with nothing deformed, r = 0: that of the bootstrap, or a tilt of clearly less energy.
+def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask) -> State:
+    """Pose of the first frame with nothing deformed, r = 0, from that of the bootstrap.
 
     Args:
         model: the rest shape and its modes.
@@ -58,14 +55,7 @@ def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask) -> tu
     log_s = np.log(np.sqrt(np.var(seen, axis=1).sum() / extent) / model.scale)
     q = quaternion_from_rotation(motion.R[0] @ model.basis.Phi)
     start = State(q[None], seen.mean(axis=1)[None] / model.radius_px, np.array([log_s]), np.zeros((1, 3, 0)))
-    energy = pose_energy(model.camera)
-    found = best = minimise(energy, data, start, None, Solver())
-    for tilt in FIRST_TILT * tilt_axes():
-        tilted = replace(start, q=quaternion_product(quaternion_exp(tilt), q)[None])
-        other = minimise(energy, data, tilted, None, Solver())
-        if other.value[0] < TILT_GAIN * best.value[0]:
-            best = other
-    return best.state, switch_between(found, best)
+    return minimise(pose_energy(model.camera), data, start, None, Solver()).state
 
 
 def off_the_saddle(last: State, model: Model) -> State:

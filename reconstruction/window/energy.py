@@ -8,12 +8,13 @@ import numpy as np
 from reconstruction.arrays import Array
 from reconstruction.basis.constraints import ALL_ROWS, ROWS, Bending, CoarseEdges
 from reconstruction.basis.model import Model
+from reconstruction.basis.rest_shape import is_flat
 from reconstruction.camera import Camera
 from reconstruction.settings import Deformation
 from reconstruction.state import State
 from reconstruction.window import priors
 
-FIRM = {"rest": 1e-2}  # of the first guide: with less it now and then changes its side
+FIRM = {"rest": 1e-2}  # of the guide: with less it now and then changes its side
 
 
 @dataclass(frozen=True)
@@ -114,14 +115,12 @@ def build_energy(
     )
 
 
-def build_guides(model: Model, deformation: Deformation, *, paper: bool = False) -> tuple[Energy, ...]:
-    """Energies minimised one after the other before that of `build_energy`, so that it starts on the right branch.
+def build_guide(model: Model, deformation: Deformation, *, paper: bool = False) -> Energy | None:
+    """The energy minimised before that of `build_energy`, so that it starts on the right branch; None where none is needed.
 
     An orthographic camera sees a bend and its mirror image alike, and either keeps the lengths, so that the minimum found
-    is sometimes the wrong one. Bending with rows α and β at rest, as in the paper, stays on its side. Then the sheet may
-    draw in as it bends, and only then are rows α and β free.
+    is sometimes the wrong one. Bending of a flat sheet with rows α and β at rest, as in the paper, stays on its side.
     """
-    if paper or model.camera.perspective or deformation not in ("bending", "inextensible"):
-        return ()
-    linear = build_energy(model, "bending", FIRM, linear=True)
-    return (linear,) if deformation == "bending" else (linear, build_energy(model, "bending"))
+    if paper or model.camera.perspective or deformation not in ("bending", "inextensible") or not is_flat(model.basis.rest):
+        return None
+    return build_energy(model, "bending", FIRM, linear=True)

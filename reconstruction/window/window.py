@@ -1,6 +1,5 @@
 """Bundle adjustment over a sliding window of frames, robust to outliers (paper §5)."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,8 +24,7 @@ from reconstruction.window.uncertainty.uncertainty import Uncertainty
 
 ADJUST = Solver()
 TOGETHER = Solver(iterations=1)  # for all frames, once the newest is adjusted
-SHOW = Solver(tolerance=1e-2)  # for what is only shown: no later frame starts from it
-GUIDE = Solver(iterations=3)  # for the guides before it
+SHOW = Solver(iterations=8, tolerance=1e-2)  # for what is only shown: no later frame starts from it
 RELIABLE = 0.5  # weight above which a point counts for the pose of the first frame
 REWEIGHTINGS = 5  # most rounds of robust weights: one for clean points, more while gross outliers still pull
 REWEIGHTED = 0.005  # share of the weights that must change for another round
@@ -46,9 +44,8 @@ class SlidingWindow:
         length: frames 𝒲 in the window.
         motion: how the rest shape is seen in the first frame.
         refine: whether frames that leave the window refine the rest shape.
-        guides: energies to be minimised before `energy` where that alone might end on the wrong branch (`build_guides`).
-            The window is then adjusted by the first of them; only the newest frame, before it is shown, by the others in
-            turn and by `energy`.
+        guide: an energy to be minimised before `energy` where that alone might end on the wrong branch (`build_guide`).
+            The window is then adjusted by it; only the newest frame, before it is shown, by `energy`.
         uncertainty: whether estimates have standard deviations.
 
     Attributes:
@@ -64,12 +61,13 @@ class SlidingWindow:
         motion: RigidMotion,
         *,
         refine: bool = False,
-        guides: Sequence[Energy] = (),
+        guide: Energy | None = None,
         uncertainty: bool = False,
     ) -> None:
         self.model = model
         self.state: State | None = None
-        self._energy, *self._shown = *guides, energy
+        self._energy = guide or energy
+        self._shown = energy if guide else None
         self._length, self._motion = length, motion
         self._pull = self._energy.rest
         self._misfit: float | None = None  # mean squared, running mean
@@ -158,7 +156,7 @@ class SlidingWindow:
     def _started(self, W: Array, weights: Array) -> State:
         """The window with the new frame as it starts, of at most its length."""
         if self.state is None:
-            pose, self._switch = first_pose(self.model, self._motion, W, weights > RELIABLE)
+            pose = first_pose(self.model, self._motion, W, weights > RELIABLE)
             return replace(pose, Lambda=self._rest.rest[None].copy())
         window = join([self.state, off_the_saddle(self.state[-1:], self.model)])
         return self._without_oldest(window) if len(window) > self._length else window
@@ -176,7 +174,7 @@ class SlidingWindow:
         if self._refine:
             self._rest.add(data)
             self._energy = self._energy.about(self._rest.rest)
-            self._shown = [energy.about(self._rest.rest) for energy in self._shown]
+            self._shown = self._shown and self._shown.about(self._rest.rest)
         return window[1:]
 
     def _surprising(self, found: Solution) -> bool:
@@ -216,18 +214,15 @@ class SlidingWindow:
         self._energy = replace(self._energy, rest=np.clip(self._misfit / FITTING**2, 1.0, FIRMEST) * self._pull)
 
     def _as_shown(self, state: State) -> State:
-        """The frames with the newest adjusted by the energies that follow the first guide, if there are guides."""
-        for energy in self._shown:
-            solver = SHOW if energy is self._shown[-1] else GUIDE
-            state = with_newest(state, self._newest(state, energy, solver).state)
-        return state
+        """The frames with the newest adjusted by the energy that follows the guide, if there is one."""
+        return with_newest(state, self._newest(state, self._shown, SHOW).state) if self._shown else state
 
     def _estimate(self, W: Array, visible: Mask, state: State) -> ShapeEstimate:
         """The newest frame of a state in units of shape and image."""
         estimate = self.model.estimate(self.frames - 1, W, visible, state)
         if self._uncertainty is None:
             return estimate
-        energy = self._shown[-1] if self._shown else self._energy
+        energy = self._shown or self._energy
         return replace(estimate, sigma=self._uncertainty.sigma(energy, self._data[-1], state[-1:], W, visible))
 
     def _newest(self, window: State, energy: Energy | None = None, solver: Solver = ADJUST) -> Solution:

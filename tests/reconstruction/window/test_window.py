@@ -12,7 +12,7 @@ from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import e3d
 from reconstruction.settings import Deformation
-from reconstruction.window.energy import build_energy, build_guides
+from reconstruction.window.energy import build_energy, build_guide
 from reconstruction.window.window import SlidingWindow
 from tests.reconstruction.world import (
     ORTHOGRAPHIC,
@@ -40,8 +40,7 @@ def window_of(
     """A window about a rest shape (3, p) in camera axes, as the estimator builds it; nothing refines the rest shape."""
     shape = given(rest, "truth", "")
     model, kind = build_model(shape, camera, modes, "chi-squared"), fitting(deformation, flat=shape.flat)
-    guides = build_guides(model, kind)
-    return SlidingWindow(model, build_energy(model, kind), length, shape.motion, guides=guides)
+    return SlidingWindow(model, build_energy(model, kind), length, shape.motion, guide=build_guide(model, kind))
 
 
 def advanced(window: SlidingWindow, W: np.ndarray, visible: np.ndarray | None = None) -> list[ShapeEstimate]:
