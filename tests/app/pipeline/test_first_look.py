@@ -1,0 +1,87 @@
+"""Where a run begins."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.options.run import Run
+from app.pipeline.stages.first_look import first_look, keeping
+from tests.tracking.region.test_search import scene
+from tracking import TrackingError
+from tracking.video import Frame, Video
+
+Image = NDArray[np.uint8]
+BLACK = 4
+NOTHING: Image = np.zeros((240, 320, 3), np.uint8)
+
+
+def unwanted(*_: object, **__: object) -> None:
+    pytest.fail("opened again")
+
+
+def write(path: Path, frames: Iterable[Image]) -> Path:
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (320, 240))
+    for image in frames:
+        writer.write(image)
+    writer.release()
+    return path
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    """A box that swings before a wall, after some black frames."""
+    box = scene((90, 60, 130, 110, 25.0), frames=40)
+    return write(tmp_path / "box.avi", [*[NOTHING] * BLACK, *(frame.image for frame in box)])
+
+
+def test_the_surface_of_a_file_is_found_and_no_frame_from_there_on_is_missing(source: Path) -> None:
+    with Video(str(source)) as video:
+        look = first_look(Run(str(source)), video)
+        assert [frame.index for frame in look.frames] == list(range(BLACK, BLACK + 40))
+    x, y, w, h = cv2.boundingRect(look.region)
+    assert (abs(x - 90) < 12, abs(y - 60) < 12, abs(w - 130) < 24, abs(h - 110) < 24) == (True,) * 4
+    blank, found = look.notes
+    assert blank == f"waited {BLACK} frames for texture: begins with frame {BLACK}"
+    assert f"--roi {x} {y} {w} {h}; choose by --roi X Y W H" in found
+
+
+def test_of_a_live_source_too(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with Video(str(source)) as video:
+        video.live = True
+        monkeypatch.setattr("app.pipeline.stages.first_look.Video", unwanted)
+        look = first_look(Run(str(source)), video)
+        assert [frame.index for frame in look.frames] == list(range(BLACK, BLACK + 40))
+    assert not look.region.all()
+
+
+def test_without_a_search_the_region_is_as_given(source: Path) -> None:
+    with Video(str(source)) as video:
+        look = first_look(Run(str(source), roi=(10, 20, 100, 90), search=False), video)
+        assert next(look.frames).index == 0
+    assert cv2.boundingRect(look.region) == (10, 20, 100, 90)
+    assert look.notes == []
+
+
+def test_a_still_scene_says_so(tmp_path: Path) -> None:
+    path = write(tmp_path / "still.avi", (frame.image for frame in scene(frames=10)))
+    with Video(str(path)) as video:
+        look = first_look(Run(str(path)), video)
+    assert look.region.all()
+    assert look.notes == ["nothing moves in 10 frames: the whole region is taken; choose by --roi X Y W H"]
+
+
+def test_no_more_of_a_live_source_is_kept_than_there_is_memory_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.pipeline.stages.first_look.MOST_BYTES", 5 * 240 * 320 * 3)
+    kept: list[Frame] = []
+    assert len(list(keeping(scene(), kept))) == 6
+    assert len(kept) == 6
+
+
+def test_nothing_to_follow_is_an_error(tmp_path: Path) -> None:
+    path = write(tmp_path / "black.avi", [NOTHING] * 5)
+    with Video(str(path)) as video, pytest.raises(TrackingError, match="corners"):
+        first_look(Run(str(path)), video)
