@@ -136,6 +136,10 @@ class Video:
                 raise item
             yield item
 
+    def arrived_s(self, frame: Frame) -> float:
+        """When a frame came from a live source, as `time.monotonic` tells it; of others now."""
+        return self._began + frame.time_s if self.live else monotonic()
+
     def close(self) -> None:
         """Stop decoding and release the source; iterating ends. May be called again."""
         self._closing.set()

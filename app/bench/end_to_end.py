@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter, time
+from typing import Any
 
 import numpy as np
 
@@ -39,9 +40,19 @@ class WholeRun:
     """The same, and until the recording is complete."""
     bare_s: float
     """The same frames decoded, made gray and followed by the same calls of Lucas-Kanade, nothing else."""
+    whole_s: float
+    """From the command to its end."""
     median_ms: float
     p95_ms: float
+    latency_ms: dict[str, float]
+    """From frame to mesh."""
+    core_ms: dict[str, float]
+    """Processor time a frame, by stage, from the first frame done to the last."""
+    bare_core_ms: float
+    """The same of the bare loop."""
     peak_mb: float
+    memory_mb: float
+    """Of all processes, while frames go on."""
     unwritten_s: float
     """Longest time between two frames after which the file of the recording had grown."""
 
@@ -74,6 +85,11 @@ def whole_run(name: str, video: Path, roi: tuple[int, int, int, int], points: in
         first_frame_s=stamps[0] - words["started"],
         loop_s=float(stamps[-1] - stamps[0]),
         wall_s=words["complete"] - stamps[0],
+        whole_s=words["ended"] - words["started"],
+        latency_ms=words["latency_ms"],
+        core_ms=words["core_ms"],
+        bare_core_ms=1e3 * bare["used_s"] / (len(stamps) - 1),
+        memory_mb=words["memory_mb"],
         bare_s=bare["seconds"],
         median_ms=float(np.median(each_ms)),
         p95_ms=float(np.percentile(each_ms, 95)),
@@ -114,13 +130,13 @@ def evaluate_many() -> int:
     return MANY_POINTS
 
 
-def run_apart(video: Path, roi: tuple[int, int, int, int], points: int, frames: int | None) -> dict[str, float]:
+def run_apart(video: Path, roi: tuple[int, int, int, int], points: int, frames: int | None) -> dict[str, Any]:
     """`modeshape run` in a process that notes when each frame is done."""
     with TemporaryDirectory(prefix="modeshape-") as folder:
         where = ["--roi", *map(str, roi), "--points", str(points), "--frames", f":{frames or ''}"]
         arguments = [str(video), *where, "--out", str(Path(folder, "run.rrd"))]
         started = time()
-        return child("app.bench.timed_run", *arguments) | {"started": started}
+        return child("app.bench.timed_run", *arguments) | {"started": started, "ended": time()}
 
 
 def help_s(log: Log) -> float:
@@ -134,11 +150,11 @@ def help_s(log: Log) -> float:
     return least
 
 
-def child(module: str, *arguments: str) -> dict[str, float]:
+def child(module: str, *arguments: str) -> dict[str, Any]:
     """What a module of ours, run by itself, prints as JSON; nothing is imported from the current folder."""
     command = [sys.executable, "-P", "-m", module, *arguments]
     done = subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True)
-    words: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    words: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return words
 
 
@@ -151,7 +167,11 @@ def ratios(runs: list[WholeRun], help_seconds: float, many: tuple[int, float] | 
             f"wall_over_bare_{name}": run.wall_s / run.bare_s,
             f"fps_{name}": (run.frames - 1) / run.loop_s,
             f"p95_over_median_{name}": run.p95_ms / run.median_ms,
-            f"peak_mb_{name}": run.peak_mb,
+            f"core_ms_{name}": sum(run.core_ms.values()),
+            f"core_over_bare_{name}": sum(run.core_ms.values()) / run.bare_core_ms,
+            f"latency_ms_{name}": run.latency_ms["median"],
+            f"whole_s_{name}": run.whole_s,
+            f"memory_mb_{name}": run.memory_mb,
             f"unwritten_s_{name}": run.unwritten_s,
         }
     first = min(run.first_frame_s for run in runs if run.points == min(POINTS))

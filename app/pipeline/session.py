@@ -148,6 +148,8 @@ class Session:
             self._split_recording(seen)
             self._recording.observe(frame, seen.number, guarded.observation, phase=phase.value)
             self._record(shapes)
+        if shapes and shapes[-1].index == seen.index and len(shapes) == 1:  # no frames have waited for a model
+            self._watch.arrived(seen.read_s)
         self._watch.add(seen.stage_ms)
         self._recording.tell("timing", seen.index, seen.time_s, dict(self._watch.now))
         self._watch.now.clear()

@@ -3,7 +3,9 @@
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from time import perf_counter
+from time import monotonic, perf_counter
+
+import numpy as np
 
 from app.recording.entities import STAGES
 
@@ -15,6 +17,7 @@ class Stopwatch:
     now: dict[str, float] = field(default_factory=dict)
     total: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
 
+    _latencies_ms: list[float] = field(default_factory=list)
     _started_s: float = 0.0
     _elapsed_s: float | None = None
 
@@ -39,6 +42,18 @@ class Stopwatch:
             yield
         finally:
             self.add({stage: (perf_counter() - started) * 1e3})
+
+    def arrived(self, read_s: float) -> None:
+        """The mesh of a frame is there, which was read at that time, as `time.monotonic` tells it."""
+        self._latencies_ms.append(1e3 * (monotonic() - read_s))
+
+    @property
+    def latency_ms(self) -> dict[str, float] | None:
+        """From frame to mesh: median, 95th percentile and worst; None without a mesh."""
+        if not self._latencies_ms:
+            return None
+        median, p95, worst = np.percentile(self._latencies_ms, [50, 95, 100]).tolist()
+        return {"median": median, "p95": p95, "worst": worst}
 
     def add(self, stage_ms: Mapping[str, float]) -> None:
         """Add what stages took elsewhere."""

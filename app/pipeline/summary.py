@@ -89,6 +89,7 @@ class RunSummary(Summary):
         frames_lost: frames without it.
         fps: frames processed a second.
         stage_ms: mean milliseconds a frame, by stage.
+        latency_ms: from a frame that is read to its mesh, once there is a model: median, 95th percentile and worst.
         recording: the first file written.
         parts: number of files, if there are several.
         last_part: the last of them.
@@ -122,6 +123,7 @@ class RunSummary(Summary):
     frames_lost: int
     fps: float
     stage_ms: Mapping[str, float]
+    latency_ms: Mapping[str, float] | None = None
     recording: Path | None = None
     parts: int | None = None
     last_part: Path | None = None
@@ -192,6 +194,7 @@ def summary_of(
         frames_lost=counts.frames_lost,
         fps=counts.frames / watch.elapsed_s,
         stage_ms={stage: total / max(counts.frames, 1) for stage, total in watch.total.items()},
+        latency_ms=watch.latency_ms,
         recording=recordings[0] if recordings else None,
         parts=len(recordings) if several else None,
         last_part=recordings[-1] if several else None,

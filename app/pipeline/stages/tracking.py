@@ -73,6 +73,7 @@ class Seen:
         number: of the frame, counted from 0.
         index: its number in the source.
         time_s: its time there.
+        read_s: when it was read, of a live source when it came, as `time.monotonic` tells it.
         objects: the points of each object asked for; an error where none can begin.
         told: what the source has to tell, in words.
         stage_ms: milliseconds it took.
@@ -81,6 +82,7 @@ class Seen:
     number: int
     index: int
     time_s: float
+    read_s: float
     objects: Mapping[int, Begun | Guarded | TrackingError]
     told: tuple[str, ...]
     stage_ms: Mapping[str, float]
@@ -144,7 +146,7 @@ class TrackingStage:
         if frame is None:
             return None
         self._keep(self._number, frame.image)
-        decoded = perf_counter()
+        decoded, read_s = perf_counter(), self.video.arrived_s(frame)
         self._trackers = {one: tracker for one, tracker in self._trackers.items() if one in asked.expected_px}
         objects = {one: self._object(one, frame, expected_px) for one, expected_px in asked.expected_px.items()}
         tracked = perf_counter()
@@ -152,7 +154,7 @@ class TrackingStage:
         del self._told[: len(told)]  # another thread may be adding
         milliseconds = {"decode": 1e3 * (decoded - began), "track": 1e3 * (tracked - decoded)}
         self._number += 1
-        return Seen(self._number - 1, frame.index, frame.time_s, objects, told, milliseconds)
+        return Seen(self._number - 1, frame.index, frame.time_s, read_s, objects, told, milliseconds)
 
     def _object(self, one: int, frame: Frame, expected_px: Array | None) -> Begun | Guarded | TrackingError:
         if one in self._trackers:

@@ -207,7 +207,7 @@ def test_a_batch_keeps_the_parts(modeshape: Command, two_scenes: Path, here: Pat
 def test_what_is_covered_has_longer_than_what_was_cut(cut: bool, wait_s: float) -> None:
     config = Run("video.mp4", points=100, rest_shape="plane", model=Model(modes=5, bootstrap_frames=5))
     pictures = list(another(60))
-    lost = Seen(0, 0, 100.0, {}, (), {})
+    lost = Seen(0, 0, 100.0, 0.0, {}, (), {})
     successor = Successor(config, lost, 0, Stopwatch(), at_once, cut=cut)
     trackers: dict[int, GuardedTracker] = {}
     for index, picture in enumerate(pictures):
