@@ -4,6 +4,7 @@ import os
 import platform
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 
 from rich.console import Console
 from rich.table import Table
@@ -14,6 +15,7 @@ from app.bench.targets import Ratios, markdown, rows
 from app.files.readme import put_table, with_table
 from app.files.writing import check_free, writable
 from app.options.bench import Bench
+from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary
 
@@ -51,8 +53,10 @@ def bench(command: Bench, progress: Progress) -> Benchmarks:
     """Measure; with `--plot` and `--readme`, write.
 
     Raises:
-        UsageError: a file cannot be written, or the README has no place for the table.
+        UsageError: psutil is missing, a file cannot be written, or the README has no place for the table.
     """
+    if find_spec("psutil") is None:
+        raise UsageError("bench reads what processes use with psutil: pip install 'modeshape[bench]'")
     check_free(command.plot, overwrite=command.overwrite)
     if command.readme:
         with_table(command.readme, README_TABLE, "")
