@@ -6,12 +6,10 @@ from rerun.chunk import Chunk
 
 from app.playback.measures import Reviewed
 from app.recording import entities
-from app.recording.blueprint import blueprint
+from app.recording.blueprint import SLOW_MS, blueprint, curves, mesh_view, video_view
 
 SIDES = ("left", "right")
 COLORS = (((90, 170, 255), (160, 205, 255)), ((255, 140, 60), (255, 200, 160)))  # strong, pale
-BACKGROUND = (24, 26, 32)
-SLOW_MS = 100.0  # the end of the bootstrap takes far longer, and would flatten the rest
 
 
 def show(reviewed: list[Reviewed], url: str) -> None:
@@ -53,59 +51,26 @@ def below(side: str, chunk: Chunk) -> Chunk:
 
 def comparison(names: list[str]) -> rrb.Blueprint:
     """Meshes and videos of two recordings beside each other, their plots in the same views."""
-    plots = [
-        ("Reprojection error, px", entities.ERROR, None),
-        ("Share of points seen", entities.VISIBLE, None),
-        ("Milliseconds per stage", entities.TIMING, (0.0, SLOW_MS)),
-    ]
+    sides = list(zip(names, SIDES, strict=True))
     return rrb.Blueprint(
         rrb.Vertical(
-            rrb.Horizontal(*(mesh_view(name, side) for name, side in zip(names, SIDES, strict=True))),
-            rrb.Horizontal(*(video_view(name, side) for name, side in zip(names, SIDES, strict=True))),
+            rrb.Horizontal(*(mesh_view(f"Mesh: {name}", f"/{side}") for name, side in sides)),
+            rrb.Horizontal(*(video_view(f"Video: {name}", f"/{side}/{entities.CAMERA}") for name, side in sides)),
             rrb.Horizontal(
-                *(
-                    rrb.TimeSeriesView(
-                        name=title,
-                        origin="/",
-                        contents=[f"+ /{side}/{entity}/**" for side in SIDES],
-                        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-                        axis_y=rrb.ScalarAxis(range=span),
-                    )
-                    for title, entity, span in plots
-                )
+                curves("Reprojection error, px", "/", of=both_sides(entities.ERROR)),
+                curves("Share of points seen", "/", of=both_sides(entities.VISIBLE)),
+                curves("Milliseconds per stage", "/", (0.0, SLOW_MS), of=both_sides(entities.TIMING)),
             ),
             row_shares=[3, 3, 2],
         ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=entities.FRAME),
+        rrb.TimePanel(state="collapsed", timeline=entities.FRAME, play_state="playing", loop_mode="all"),
         auto_layout=False,
         auto_views=False,
     )
 
 
-def mesh_view(name: str, side: str) -> rrb.Spatial3DView:
-    """The scene of one side, seen as in the blueprint of a single recording."""
-    return rrb.Spatial3DView(
-        name=f"Mesh: {name}",
-        origin=f"/{side}",
-        contents=[
-            f"+ /{side}/{entities.WORLD}/**",
-            f"- /{side}/{entities.CAMERA}/**",
-            f"+ /{side}/{entities.CAMERA}",
-        ],
-        background=BACKGROUND,
-        line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital,
-            position=(0.7, -0.5, -3.4),
-            look_target=(0.0, 0.0, 0.0),
-            eye_up=(0.0, -1.0, 0.0),
-        ),
-    )
-
-
-def video_view(name: str, side: str) -> rrb.Spatial2DView:
-    """The picture of one side with its points and wireframe."""
-    origin = f"/{side}/{entities.CAMERA}"
-    return rrb.Spatial2DView(name=f"Video: {name}", origin=origin, contents="$origin/**", background=BACKGROUND)
+def both_sides(entity: str) -> list[str]:
+    """What is below an entity on both sides."""
+    return [f"+ /{side}/{entity}/**" for side in SIDES]

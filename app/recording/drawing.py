@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.arrays import Array, Flags
 from app.recording import entities
-from app.recording.columns import Values
+from app.recording.modes import MOVEMENT_RGB
 from app.recording.stream import Stream
 from app.recording.styles import LEADING
 from app.recording.wireframe import Strips
@@ -17,6 +17,8 @@ from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import rms_radius
 from reconstruction.estimate import ShapeEstimate
 
+RELIEF = 0.7  # depth beyond the middle, over the shape's RMS radius, at which the colours end
+LEVELS = 32  # of colours: few can be packed
 UNSURE = 0.05  # standard deviation over the shape's RMS radius at which a vertex is red; a sure one is white
 
 
@@ -55,10 +57,8 @@ def draw(stream: Stream, shape: Shape) -> None:
     """Write what shows the shape of the stream's frame."""
     vertices = shape.model.shape(shape.R, shape.t, shape.s, shape.Lambda)
     projection = shape.model.camera.project(vertices).T.astype(np.float32)
-    mesh: dict[str, Values] = {"vertex_positions": vertices.T.astype(np.float32)}
-    if shape.sigma is not None:
-        mesh["vertex_colors"] = colors(shape.sigma, vertices)
-    stream.row(entities.MESH, rr.Mesh3D.columns, **mesh)
+    tint = depth_colors(vertices) if shape.sigma is None else uncertainty_colors(shape.sigma, vertices)
+    stream.row(entities.MESH, rr.Mesh3D.columns, vertex_positions=vertices.T.astype(np.float32), vertex_colors=tint)
     stream.row(entities.WIREFRAME, rr.LineStrips2D.columns, strips=shape.strips.through(projection))
     stream.points(entities.PREDICTED, projection[~shape.visible])
     if shape.errors_px.size:
@@ -68,8 +68,24 @@ def draw(stream: Stream, shape: Shape) -> None:
     stream.scalars(entities.LEADING, *shape.Lambda[:, :LEADING].ravel())
 
 
-def colors(sigma: Array, shape: Array) -> NDArray[np.uint32]:
-    """Colours (p,) 0xRRGGBBAA of the vertices (3, p) by their standard deviations (p,), to multiply a texture by."""
+def uncertainty_colors(sigma: Array, shape: Array) -> NDArray[np.uint32]:
+    """Colours (p,) 0xRRGGBBAA of the vertices (3, p) by their standard deviations (p,): from white to red."""
     share = np.clip(sigma / (UNSURE * rms_radius(shape)), 0.0, 1.0)
     other = np.round(255 * (1 - share)).astype(np.uint32)
     return np.asarray(0xFF0000FF + (other << 16) + (other << 8), np.uint32)
+
+
+def depth_colors(shape: Array) -> NDArray[np.uint32]:
+    """Colours (p,) 0xRRGGBBAA of the vertices (3, p): nearer than the middle is blue, farther is red."""
+    level = np.clip((shape[2] - shape[2].mean()) / (2 * RELIEF * rms_radius(shape)) + 0.5, 0.0, 1.0) * (LEVELS - 1)
+    return RAMP[np.rint(level).astype(np.int64)]
+
+
+def ramp() -> NDArray[np.uint32]:
+    """Colours (LEVELS,) 0xRRGGBBAA from blue over white to red."""
+    place, stops = np.linspace(0, 1, LEVELS), np.linspace(0, 1, len(MOVEMENT_RGB))
+    red, green, blue = (np.rint(np.interp(place, stops, channel)).astype(np.uint32) for channel in MOVEMENT_RGB.T)
+    return np.asarray(red << 24 | green << 16 | blue << 8 | 255, np.uint32)
+
+
+RAMP = ramp()

@@ -21,6 +21,7 @@ Static:
   focal_px, center_px (2).
 - `modes/<n>`: Mesh3D vertex_positions, triangle_indices, vertex_colors: the n-th mode, from 1, out of the plane, beside
   the others; `modes/names`: Points3D, their labels. There when the run is complete.
+- `help`: TextDocument, what the views show.
 - `configuration`, `summary`: TextDocument for people; modeshape.Document with json and version for
   programs.
 
@@ -35,14 +36,18 @@ Every frame:
 - `timing/<stage>`: Scalars, milliseconds.
 - `events`: TextLog, when something happens.
 
+Until there is a shape:
+
+- `world/status`: Points3D without a size, whose label says what is waited for.
+
 The first frame:
 
 - `world/camera/region`: LineStrips2D, borders of the region that the points are from, px.
 
 Every frame with a shape:
 
-- `world/mesh`: Mesh3D vertex_positions (p, 3) float32, camera axes, pixels of the first frame; with
-  `--uncertainty` vertex_colors, which the viewer multiplies the texture by: the redder, the less sure.
+- `world/mesh`: Mesh3D vertex_positions (p, 3) float32, camera axes, pixels of the first frame; vertex_colors: from
+  near (blue) to far (red), with `--uncertainty` the redder, the less sure. One view shows the texture, another the colours.
 - `world/camera/wireframe`: LineStrips2D, the reprojected mesh in px: the vertices in the order of
   `strips`.
 - `world/camera/points/predicted`: Points2D, not seen; drawn where the model says they are.
@@ -61,6 +66,9 @@ FRAME = "frame"
 TIME = "time"
 
 WORLD = "world"
+STATUS = "world/status"
+TRUTH = "world/truth"
+HELP = "help"
 MESH = "world/mesh"
 CAMERA = "world/camera"
 IMAGE = "world/camera/image"

@@ -19,7 +19,7 @@ from app.recording.drawing import Shape, draw
 from app.recording.images import cropped, embedded_video, jpeg, texture
 from app.recording.modes import small_multiples
 from app.recording.stream import Stream
-from app.recording.styles import coefficient_styles, model_components, placement, styles
+from app.recording.styles import coefficient_styles, model_components, placement, styles, waiting_for
 from app.recording.viewer import running_viewer, spawned_viewer
 from app.recording.wireframe import NO_STRIPS, Strips
 from app.terminal.errors import UsageError
@@ -75,7 +75,7 @@ class Recording:
         self._video_ns: Indices = np.empty(0, np.int64)
         self._frames = 0
         self._last_seen: Array = NOWHERE
-        self._lost_in: set[int] = set()
+        self._without_shape: set[int] = set()  # frames that said so
         self._model: Model | None = None
         self._textured: tuple[bytes, ...] | None = None
         self._undrawn: dict[int, Shape] = {}
@@ -119,11 +119,13 @@ class Recording:
             without_shape = self._model is None or phase.lower() == "lost"
             lost = self._last_seen[~visible & np.isfinite(self._last_seen[:, 0])] if without_shape else NOWHERE
             self._stream.points(entities.LOST, lost)
-            if len(lost):
-                self._lost_in.add(frame.index)
+            if self._model is None or len(lost):
+                self._without_shape.add(frame.index)
             if self._model and without_shape:  # the model's last word would stay on the picture
                 self._stream.points(entities.PREDICTED, NOWHERE)
                 self._stream.row(entities.WIREFRAME, rr.LineStrips2D.columns, strips=NO_STRIPS)
+            if self._model is None:
+                self._stream.row(entities.STATUS, rr.Points3D.columns, **waiting_for(self._frames + 1))
             self._stream.row(entities.OBSERVATION, ours("Observation"), visible=visible, phase=[phase])
             if visible.size:
                 self._stream.scalars(entities.VISIBLE, visible.mean())
@@ -169,9 +171,10 @@ class Recording:
                 known["sigma"] = estimate.sigma
             for entity in self._estimates:
                 self._stream.row(entity, ours("Estimate"), **known)
-            if index in self._lost_in:
+            if index in self._without_shape:
+                self._without_shape.remove(index)
                 self._stream.points(entities.LOST, NOWHERE)
-                self._lost_in.remove(index)
+                self._stream.row(entities.STATUS, rr.Points3D.columns, positions=np.empty((0, 3)), labels=[])
             shape = Shape.of(time_s, self._model, self._strips, estimate)
             if self._drawn_later:
                 self._undrawn[index] = shape

@@ -47,7 +47,7 @@ class Stream:
         if self._stream is None:
             return
         try:
-            self._stream.set_sinks(*sinks, default_blueprint=blueprint())
+            self._stream.set_sinks(*sinks, default_blueprint=blueprint(live=bool(urls)))
         except RuntimeError as error:
             raise self._failure(error) from error
         self._stream.set_log_time_enabled(False)

@@ -7,6 +7,7 @@ import rerun as rr
 
 from app.arrays import Array, Indices
 from app.recording import entities
+from app.recording.columns import Values
 from app.recording.stream import Loggable
 from app.recording.wireframe import Strips
 from reconstruction.basis.model import Model
@@ -27,9 +28,31 @@ LAMBDA_RGB = (
 LEADING = len(LAMBDA_RGB[0])
 """Entries per row of Λ that are plotted over time."""
 
+FRUSTUM = 0.4  # length of the camera's pyramid; the mesh has unit size, and is farther away
+
+HELP = """\
+# What you see
+
+**Mesh**: the surface in three dimensions, with the colours of the first frame, seen a little from the side of the camera.
+Drag to turn it, scroll to come nearer. Below it the same from the side: blue is near, red is far; with `--uncertainty`,
+white is sure, red is not.
+
+**Video**: each frame with the mesh on it. Green points were seen in the frame, orange ones are hidden and drawn where the
+model says they are, red ones are lost.
+
+**Quality**: how far seen points are from where the model puts them, in pixels: below 1 is good, above 3 is poor.
+
+**Deformation**: how much each mode is bent (τ) or stretched (α, β). **Modes**: the ways of bending, the coarsest first.
+
+**Summary**: what came out. **Events**: what happened on the way.
+
+The space bar plays and pauses; the arrow keys go frame by frame.
+"""
+
 
 def styles() -> Iterator[tuple[str, Loggable]]:
     """How points, lines and curves look."""
+    yield entities.HELP, rr.TextDocument(HELP, media_type=rr.MediaType.MARKDOWN)
     for entity in ("/", entities.WORLD):
         yield entity, rr.ViewCoordinates.RDF
     colors = {entities.SEEN: SEEN_RGB, entities.PREDICTED: PREDICTED_RGB, entities.LOST: LOST_RGB}
@@ -38,6 +61,7 @@ def styles() -> Iterator[tuple[str, Loggable]]:
     for k, entity in enumerate(colors, start=1):
         # A negative radius is in points of the screen: the same size at every zoom.
         yield entity, rr.Points2D.from_fields(class_ids=k, radii=-2.0, draw_order=30 + k, show_labels=False)
+    yield entities.STATUS, rr.Points3D.from_fields(radii=0.0, show_labels=True, colors=(205, 210, 220))
     yield entities.WIREFRAME, rr.LineStrips2D.from_fields(colors=[WIREFRAME_RGBA], radii=-0.5, draw_order=20)
     yield entities.REGION, rr.LineStrips2D.from_fields(colors=[PREDICTED_RGB], radii=-1.0, draw_order=25)
     # The viewer's pixels are squares between whole numbers; ours, like OpenCV's, have their centres there.
@@ -49,7 +73,7 @@ def styles() -> Iterator[tuple[str, Loggable]]:
 def coefficient_styles(modes: int) -> Iterator[tuple[str, Loggable]]:
     """How the plots of Λ look, when the number of modes is known."""
     shown = min(LEADING, modes)
-    names = [f"{row}{k + 1}" for row in "αβτ" for k in range(shown)]
+    names = [f"{row}{k + 1}" for row in ("lengthwise α", "across β", "bending τ") for k in range(shown)]
     yield entities.LEADING, rr.SeriesLines(names=names, colors=[color for row in LAMBDA_RGB for color in row[:shown]])
     # Bars in three groups. Rerun refuses a BarChart without values, and static ones would hide every frame's.
     places = np.arange(3 * modes) + np.repeat(np.arange(3) * max(1, modes // 5), modes)
@@ -72,7 +96,7 @@ def placement(vertices: Array, camera: Camera, size: tuple[int, int]) -> Iterato
                 image_from_camera=camera.K,
                 resolution=size,
                 camera_xyz=rr.ViewCoordinates.RDF,
-                image_plane_distance=0.25 * scale * camera.focal_px,
+                image_plane_distance=FRUSTUM,
             ),
         )
 
@@ -97,3 +121,8 @@ def model_components(
         "focal_px": camera.focal_px,
         "center_px": camera.center_px,
     }
+
+
+def waiting_for(frames: int) -> dict[str, Values]:
+    """What is said in place of a mesh while the first frames are watched: a row of Points3D."""
+    return {"positions": np.zeros((1, 3), np.float32), "labels": [f"watching the first frames: {frames}"]}

@@ -31,15 +31,17 @@ def test_the_blueprint_opens_healthy(viewer: Viewer) -> None:
     shot(viewer, "Mesh", 30)
     views = viewer.client.get_state().views
     assert {view.name.split(":")[0]: view.view_class for view in views} == {
-        "Mesh": "3D",
+        "Mesh, from where the camera is": "3D",
+        "From the side": "3D",
         "Video": "2D",
+        "What you see": "TextDocument",
         "Reprojection error, px": "TimeSeries",
         "Share of points seen": "TimeSeries",
-        "Leading coefficients, px": "TimeSeries",
-        "This frame": "BarChart",
+        "How it deforms": "TimeSeries",
+        "This frame, by mode": "BarChart",
         "Milliseconds per stage": "TimeSeries",
         "Events": "TextLog",
-        "Modes": "2D",
+        "Modes": "3D",
         "Configuration": "TextDocument",
         "Summary": "TextDocument",
     }

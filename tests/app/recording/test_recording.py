@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rerun.chunk import RrdReader
 
 from app.recording.recording import entities
 from reconstruction.camera import Camera
@@ -54,8 +55,12 @@ def test_what_is_unsure_is_red(run: Run, rows: Rows, tmp_path: Path) -> None:
         recording.observe(Frame(0, 0.0, run.picture), run.observations[0], phase="tracking")
         recording.rest(run.basis, run.mesh, run.camera, run.picture, run.pixels)
         recording.estimate(0, 0.0, replace(run.estimates[0], sigma=None))
-    names = {name for _, name in read(path)}
-    assert not names & {"Mesh3D:vertex_colors", "modeshape.Estimate:sigma"}
+    sure = read(path)
+    assert not any(name == "modeshape.Estimate:sigma" for _, name in sure)
+    depth = np.array(sure[entities.MESH, "Mesh3D:vertex_colors"][0], np.uint32)
+    nearest, farthest = run.estimates[0].shape[2].argsort()[[0, -1]]
+    assert depth[nearest] >> 8 & 255 > depth[nearest] >> 24  # bluer than red
+    assert depth[farthest] >> 8 & 255 < depth[farthest] >> 24
 
 
 def test_observations_come_back(run: Run, rows: Rows) -> None:
@@ -114,6 +119,12 @@ def test_points_are_lost_until_a_shape_predicts_them(run: Run, rows: Rows, tmp_p
     np.testing.assert_allclose(lost, run.observations[0].points_px[hidden], rtol=1e-6)
 
 
+def test_until_there_is_a_shape_the_view_says_what_is_waited_for(rows: Rows, tmp_path: Path) -> None:
+    assert rows[entities.STATUS, "Points3D:labels"][1] == []
+    shapeless = read(write_run(tmp_path / "shapeless.rrd", frames=2, first_shape=9).path)
+    assert shapeless[entities.STATUS, "Points3D:labels"][1] == ["watching the first frames: 2"]
+
+
 def test_a_lost_surface_leaves_no_mesh_on_the_picture(tmp_path: Path) -> None:
     path = tmp_path / "lost.rrd"
     run = write_run(path, frames=3, first_shape=0)
@@ -161,3 +172,24 @@ def test_an_orthographic_camera_has_no_pinhole(tmp_path: Path) -> None:
     rows = read(write_run(tmp_path / "flat.rrd", camera=Camera(np.inf, np.array([80.0, 60.0]))).path)
     assert rows[f"{entities.MODEL}/0", "modeshape.Model:perspective"][None] == [False]
     assert not any(entity == entities.CAMERA for entity, _ in rows)
+
+
+def test_a_file_with_a_final_pass_is_drawn_once(tmp_path: Path, run: Run) -> None:
+    """What is drawn on the way would be there twice; without a final pass it is drawn at the end."""
+    sizes = []
+    for revised in (range(3), range(0)):
+        path = tmp_path / f"{len(revised)}.rrd"
+        with record(path, final_pass=True) as recording:
+            recording.rest(run.basis, run.mesh, run.camera, run.picture, run.pixels)
+            for index in range(3):
+                recording.observe(Frame(index, index / 30, run.picture), run.observations[index], phase="tracking")
+                recording.estimate(index, index / 30, run.estimates[0])
+            for index in revised:
+                recording.final_pass()
+                recording.estimate(index, index / 30, run.estimates[index])
+        rows = read(path)
+        for index in range(3):
+            shown = np.array(rows[entities.MESH, "Mesh3D:vertex_positions"][index])
+            np.testing.assert_allclose(shown, run.estimates[index if revised else 0].shape.T, rtol=1e-6, atol=1e-5)
+        sizes.append(sum(chunk.num_rows for chunk in RrdReader(path).stream() if chunk.entity_path == f"/{entities.MESH}"))
+    assert sizes[0] == sizes[1]
