@@ -45,7 +45,8 @@ def shown(viewer: Viewer, *recordings: Path) -> set[str]:
 def test_one_recording(mortal_viewer: Viewer, tmp_path: Path) -> None:
     run = write_run(tmp_path / "one.rrd", frames=FRAMES)
     names = shown(mortal_viewer, run.path)
-    assert {"Mesh", "Reprojection error, px", "Milliseconds per stage", "Events", "Configuration", "Summary"} <= names
+    assert any(name.startswith("Mesh") for name in names)
+    assert {"Reprojection error, px", "Milliseconds per stage", "Events", "Configuration", "Summary"} <= names
     early, late = shot(mortal_viewer, "Mesh", 0), shot(mortal_viewer, "Mesh", 30)
     for picture in (early, late):
         assert (picture.max(axis=2) > 120).mean() > 0.05  # the mesh is there
