@@ -16,8 +16,8 @@ from app.options.evaluate import Evaluate
 from app.options.model import Model
 from app.options.run import Output, Run
 from app.pipeline.evaluate import evaluate
+from app.pipeline.quality.verdict import GRADES
 from app.pipeline.session import Session
-from app.pipeline.verdict import GRADES
 from app.reproduce.part import Part
 from app.reproduce.result import markdown_table
 from app.synthetic.catalog import HELD_SEEDS, KINDS
@@ -100,7 +100,7 @@ def page(cases: list[Case]) -> str:
     columns = ("verdict", "cases", "e3d ≤ 3 %", "e3d > 5 %")
     held_back = [case for case in scores if case.held_back]
     every = [(case.name, 100 * case.words["e3d"], case.words["verdict"], case.words["verdict_reason"]) for case in scores]
-    rule = Path("app/pipeline/verdict.py")
+    rule = Path("app/pipeline/quality/verdict.py")
     return "\n".join(
         [
             "# What a verdict is worth\n",

@@ -134,7 +134,7 @@ def write_meshes(playback: Playback, folder: Path, command: Export, advance: Cal
 
     upright = command.axes == "y-up"
     axes = "x right, y up, z towards the viewer" if upright else "x right, y down, z forward (camera axes)"
-    comment = f"modeshape {playback.version}; {axes}; unit: pixels of the first frame"
+    comment = f"modeshape {playback.version}; {axes}; unit: {playback.unit}"
     kind: Literal["obj", "ply"] = "obj" if command.kind == "obj" else "ply"
     sequence = MeshSequence(folder, kind, playback.mesh.faces, texture_coordinates(playback), comment)
     sequence.texture(cv2.imencode(".png", playback.texture_bgr)[1].tobytes())

@@ -72,6 +72,11 @@ class Source:
     """Where --texture lies in the first frame: X Y WIDTH HEIGHT in pixels; without it over the whole mesh."""
     opacity: float = 1.0
     """Of --texture, 0 to 1."""
+    size_mm: float | None = None
+    """A known length of the surface in millimetres, which makes all that comes out millimetres: of its longest side, or
+    --between two places; along a sheet, as a tape lies on it."""
+    between: tuple[float, float, float, float] | None = None
+    """What --size-mm is the length of: X1 Y1 X2 Y2, two places in the first frame, px."""
     jobs: int | None = None
     """1: do everything in one process, one thing after the other. Without it, each stage has a process of its own where
     there are cores for it; the shapes are the same."""
@@ -85,6 +90,12 @@ class Source:
             raise UsageError(f"--points {self.points} is too few: {few}; give {FEWEST_POINTS} and more, best 300 to 1000")
         if self.duration is not None and not self.duration > 0:
             raise UsageError(f"--duration {self.duration} is no time: give seconds, more than 0")
+        if self.size_mm is not None and not 0 < self.size_mm < float("inf"):
+            raise UsageError(f"--size-mm {self.size_mm} is no length: give millimetres, more than 0")
+        if self.size_mm is not None and self.camera == "orthographic":
+            raise UsageError("--size-mm needs a camera in perspective: leave --camera orthographic out")
+        if self.between is not None and (self.size_mm is None or self.between[:2] == self.between[2:]):
+            raise UsageError("--between goes with --size-mm, the length between two different places: --size-mm 297")
         if self.place is not None and min(self.place[2:]) < 1:
             area = " ".join(map(str, self.place))
             raise UsageError(f"--place {area} has no area: give X Y WIDTH HEIGHT, both sizes 1 and more")

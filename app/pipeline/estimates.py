@@ -9,7 +9,8 @@ import numpy as np
 
 from app.arrays import Array
 from app.files.writing import writable
-from app.pipeline.verdict import Course
+from app.pipeline.quality.ruler import Ruler
+from app.pipeline.quality.verdict import Course
 from app.terminal.summary import Summary
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model
@@ -32,6 +33,7 @@ class Collected:
         last_rms_px: of the newest estimate.
         switches: how often the window took another branch: bent or tilted otherwise.
         course: what each frame tells of its quality.
+        ruler: a known length; None if there is none.
     """
 
     everything: bool
@@ -43,6 +45,7 @@ class Collected:
     last_rms_px: float | None = None
     switches: int = 0
     course: Course = field(default_factory=Course)
+    ruler: Ruler | None = None
 
     def add(self, frame: int, estimate: ShapeEstimate) -> None:
         """Add the estimate of a source frame."""
@@ -53,6 +56,8 @@ class Collected:
         self.residuals += len(seen)
         self.switches += estimate.switch is not None
         self.course.add(frame, estimate)
+        if self.ruler is not None:
+            self.ruler.add(estimate.shape)
         if self.everything or frame in self.truth_frames:
             self.estimates[frame] = estimate
 
@@ -115,11 +120,13 @@ def sigmas(estimates: Iterable[ShapeEstimate]) -> Array | None:
     return np.stack(known) if known else None
 
 
-def save_shapes(path: Path, estimates: Mapping[int, ShapeEstimate], model: Model, lost: Iterable[int] = ()) -> None:
-    """Write S (F, 3, P) camera axes, pixels; R, s, t, Lambda, faces, visible, frames, and the basis they refer to.
+def save_shapes(
+    path: Path, estimates: Mapping[int, ShapeEstimate], model: Model, lost: Iterable[int] = (), unit: float = 1.0
+) -> None:
+    """Write S (F, 3, P) camera axes; R, s, t, Lambda, faces, visible, frames, and the basis they refer to.
 
-    And sigma (F, P), the standard deviations of the vertices, if they were asked for.
-    Frames in which the surface was lost get rows of NaN.
+    And sigma (F, P), the standard deviations of the vertices, if they were asked for. Lengths are in pixels of the first
+    frame, or in another unit, of which a pixel has so many. Frames in which the surface was lost get rows of NaN.
 
     Raises:
         UsageError: the file cannot be written.
@@ -129,15 +136,15 @@ def save_shapes(path: Path, estimates: Mapping[int, ShapeEstimate], model: Model
     rows = [estimates.get(frame, nothing) for frame in frames]
     basis, sigma = model.basis, sigmas(rows)
     arrays: dict[str, Any] = {
-        "S": np.stack([e.shape for e in rows]),
+        "S": unit * np.stack([e.shape for e in rows]),
         "R": np.stack([e.R for e in rows]),
-        "s": np.array([e.s for e in rows]),
+        "s": np.array([e.s for e in rows]) / unit,
         "t": np.stack([e.t for e in rows]),
-        "Lambda": np.stack([e.Lambda for e in rows]),
+        "Lambda": unit * np.stack([e.Lambda for e in rows]),
         "visible": np.stack([e.visible for e in rows]),
         "frames": np.array(frames),
         "faces": model.mesh.faces,
-        "rest": basis.rest,
+        "rest": unit * basis.rest,
         "Upsilon": basis.Upsilon,
         "eigenvalues": basis.eigenvalues,
         "Phi": basis.Phi,
@@ -145,7 +152,7 @@ def save_shapes(path: Path, estimates: Mapping[int, ShapeEstimate], model: Model
         "perspective": model.camera.perspective,
     }
     if sigma is not None:
-        arrays["sigma"] = sigma
+        arrays["sigma"] = unit * sigma
     with writable(path) as file:
         np.savez_compressed(file, **arrays)
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Literal
 
 from app.pipeline.estimates import Scores
+from app.pipeline.quality.verdict import Grade, verdict
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
-from app.pipeline.verdict import Grade, verdict
 from app.terminal.exit_code import ExitCode
 from app.terminal.summary import Summary, print_lines
 from tracking.guarded import Change, Guarded
@@ -75,6 +75,7 @@ class RunSummary(Summary):
         priors: weights in force.
         focal_px: focal length; None for an orthographic camera.
         focal_note: how it was found.
+        mm_per_px: millimetres in a pixel of the first frame, if a length is known.
         branch_switches: how often the window took another branch.
         reprojection_rms_px: over all visible points of all frames.
         revisions: how often another model replaced the one before, on the way.
@@ -109,6 +110,7 @@ class RunSummary(Summary):
     priors: Mapping[str, float]
     focal_px: float | None
     focal_note: str | None = None
+    mm_per_px: float | None = None
     branch_switches: int
     reprojection_rms_px: float | None
     revisions: int
@@ -140,6 +142,7 @@ class RunSummary(Summary):
                 "frames": f"{self.frames} at {self.fps:.1f} a second{', interrupted' if self.interrupted else ''}",
                 "error": None if self.reprojection_rms_px is None else f"{self.reprojection_rms_px:.2f} px, RMS",
                 "against the truth": None if self.score is None else f"e3d {self.score.e3d:.2%}",
+                "scale": None if self.mm_per_px is None else f"{self.mm_per_px:.4g} mm in a pixel of the first frame",
                 "objects": f"{self.objects}, one after another" if self.objects > 1 else None,
                 "recording": self.recording if self.parts is None else f"{self.recording} to {self.last_part}",
             },
@@ -180,6 +183,7 @@ def summary_of(
         priors=reconstruction.weights,
         focal_px=camera.focal_px if camera.perspective else None,
         focal_note=reconstruction.focal_note or None,
+        mm_per_px=tracked.mm_per_px,
         branch_switches=collected.switches,
         reprojection_rms_px=collected.reprojection_rms_px,
         revisions=reconstruction.revisions,

@@ -13,6 +13,7 @@ from app.options.run import Run, configuration
 from app.pipeline.estimates import Collected, Scores, save_shapes
 from app.pipeline.prepare import estimator
 from app.pipeline.processed import Surface
+from app.pipeline.quality.ruler import ruler
 from app.pipeline.stages.tracking import LAG, Begun
 from app.pipeline.stopwatch import Stopwatch
 from reconstruction.estimate import ShapeEstimate
@@ -188,6 +189,13 @@ class TrackedObject:
         result = collected.score_against(self._truth, rest.motion.shape, self.reconstruction.model.mesh)
         return Scores.of(result) if result else None
 
+    @property
+    def mm_per_px(self) -> float | None:
+        """Millimetres in a pixel of the first frame, if a length is known."""
+        known = self.collected.ruler
+        rest = self.reconstruction.rest
+        return known.mm_per_px(along=rest is None or rest.kind != "rigid") if known else None
+
     def save(self) -> None:
         """Write the files asked for.
 
@@ -202,12 +210,21 @@ class TrackedObject:
             with writable(output.tracks_out) as file:
                 Tracks(W, visible, K=camera.K if camera.perspective else None).save(file)
         if output.shapes_out and self.collected.estimates:
-            save_shapes(output.shapes_out, self.collected.estimates, self.reconstruction.model, self.collected.lost)
+            save_shapes(
+                output.shapes_out,
+                self.collected.estimates,
+                self.reconstruction.model,
+                self.collected.lost,
+                self.mm_per_px or 1.0,
+            )
 
     def _nothing(self) -> Collected:
         """No estimates yet."""
         truth_frames = frozenset(self._truth.frames.tolist()) if self._truth else frozenset()
-        return Collected(self.config.output.shapes_out is not None, truth_frames)
+        ends = None if self.config.between is None else np.reshape(self.config.between, (2, 2))
+        size_mm = self.config.size_mm if self.number == 0 else None  # nobody knows another object's
+        known = None if size_mm is None else ruler(size_mm, ends, self.points_px)
+        return Collected(self.config.output.shapes_out is not None, truth_frames, ruler=known)
 
     def _of_frames(self, estimates: list[ShapeEstimate]) -> list[FrameShape]:
         """Estimates with the oldest frames that wait for one."""

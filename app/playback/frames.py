@@ -84,10 +84,14 @@ class Estimates:
     Lambda: Array
     sigma: Array
 
+    def scaled(self, factor: float) -> "Estimates":
+        """The same in other units of the rest shape."""
+        return replace(self, s=self.s / factor, Lambda=factor * self.Lambda, sigma=factor * self.sigma)
+
     def of(self, i: int, model: Model, W: Array, visible: Flags) -> ShapeEstimate:
         """Shape and pose of row i, by the model they are of; W (2, P) px, visible (P,)."""
         q = quaternion_from_rotation(rotation_from_quaternion(self.quaternion[i]) @ model.basis.Phi)
-        t, log_s = self.t[i] / model.radius_px, np.log(self.s[i])
+        t, log_s = self.t[i] / model.radius_px, np.log(self.s[i] / model.scale)
         state = State(q[None], t[None], np.array([log_s]), self.Lambda[i][None] / model.unit)
         sigma = self.sigma[i] if np.isfinite(self.sigma[i]).all() else None
         return replace(model.estimate(i, W, visible, state), sigma=sigma)

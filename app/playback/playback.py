@@ -4,7 +4,7 @@ What is written where is listed in `app.recording.entities`.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Self, cast
@@ -114,6 +114,11 @@ class Playback:
             notes.append(f"{file.path} is of a run that was ended before it was complete: it has no summary")
         if recorded_model is None:
             notes.append(f"{file.path} contains no shapes: the run ended before its rest shape was found")
+        estimates = read_estimates(rows, entity, numbers, models if recorded_model else [])
+        mm_per_px = summary.get("mm_per_px") if summary else None
+        if recorded_model and isinstance(mm_per_px, float):
+            recorded_model = replace(recorded_model, model=recorded_model.model.scaled(mm_per_px))
+            estimates = estimates.scaled(mm_per_px)
         return cls(
             path=file.path,
             name=recording_name(rows) or file.path.stem,
@@ -128,10 +133,15 @@ class Playback:
             events=events(rows),
             W=observed.W,
             visible=observed.visible,
-            estimates=read_estimates(rows, entity, numbers, models if recorded_model else []),
+            estimates=estimates,
             recorded_model=recorded_model,
             file=file,
         )
+
+    @property
+    def unit(self) -> str:
+        """Of shapes: millimetres where a length was known, else pixels of the first frame."""
+        return "millimetres" if self.summary and self.summary.get("mm_per_px") else "pixels of the first frame"
 
     @property
     def model(self) -> Model:

@@ -4,6 +4,8 @@ Inside, lengths are over the rest shape's RMS radius, and image points over the 
 whatever the units of the two are.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from reconstruction.arrays import Array, Mask
@@ -45,6 +47,10 @@ class Model:
         self.radius_px = scale * self.radius
         self.focal = camera.focal_px / self.radius_px
         self.B = np.concatenate([basis.Phi.T @ basis.rest / self.radius, np.sqrt(p) * basis.Upsilon, np.ones((1, p))])
+
+    def scaled(self, factor: float) -> "Model":
+        """The same in other units of the rest shape: so many times as many, each so much smaller."""
+        return Model(replace(self.basis, rest=factor * self.basis.rest), self.mesh, self.camera, self.scale / factor)
 
     @property
     def unit(self) -> float:

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.commands.cli import COMMANDS
 from tests.app.command_line import ENVIRONMENT, PROGRAM, Command, in_own_process, turning, write_video
 from tests.synthetic_run import verify
 
@@ -170,19 +169,6 @@ def test_evaluate_repeats_itself_by_its_seed(modeshape: Command, shared_data: Pa
 
     assert e3d(3) == e3d(3)
     assert e3d(3) != e3d(4)
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_explains_itself(modeshape: Command, command: str) -> None:
-    outcome = modeshape(command, "--help")
-    assert outcome.code == 0
-    lines = outcome.out.splitlines()
-    assert lines[1].startswith(f"  modeshape {command}")
-    assert len(lines) <= 40
-    assert max(map(len, lines[lines.index("") :])) <= 80
-    everything = modeshape(command, "--help-all")
-    assert everything.code == 0
-    assert "--json" in everything.out
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.pipeline.verdict import Course, longest, verdict
+from app.pipeline.quality.verdict import Course, longest, verdict
 from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.map import Map

@@ -1,6 +1,6 @@
 """How good a reconstruction is, in a word, with the reason and what helps: thresholds on what is known without the truth.
 
-[docs/verdict.md](../../docs/verdict.md) has what the words were worth where the truth is known, and how it was measured.
+[docs/verdict.md](../../../docs/verdict.md) has what the words were worth where the truth is known, and how it was measured.
 """
 
 from array import array

@@ -1,0 +1,1 @@
+"""What is said of shapes: how good they are, and how long a unit of theirs is."""
