@@ -64,10 +64,10 @@ def smoothed(W: Array, visible: Mask, bundle: Bundle, residual: Array) -> tuple[
         z = np.asarray(spsolve((sp.diags_array(weight) + stiffness).tocsc(), weight * shape[2]))
         sound = sound & ~spike(D @ z)
     D, _ = off_neighbours_plane(shape[:2], np.ones_like(sound))
-    for _ in range(ROUNDS):  # what smoothing left, most of it at the border
-        off = D @ z
-        far = spike(off)
-        z, sound = z - np.where(far, off, 0.0), sound & ~far
+    for _ in range(ROUNDS):  # what smoothing left, most of it at the border: there, the plane would carry it off
+        far = spike(D @ z)
+        sound = sound & ~far
+        z = z - np.where(far, off_neighbours_plane(shape[:2], sound)[0] @ z, 0.0)
     return replace(bundle.motion, shape=axes @ (shape + along(information, z - shape[2]))), sound
 
 
