@@ -148,14 +148,12 @@ def write_meshes(playback: Playback, folder: Path, command: Export, advance: Cal
 
 def write_video(playback: Playback, out: Path, advance: Callable[[], None]) -> None:
     """The pictures with mesh, points and reprojections drawn over them, at the video's pace."""
-    from app.files.video_out import steady, writable_video
+    from app.files.video_out import usual_fps, writable_video
     from app.playback.overlay import enlarged, overlaid
 
-    fps, shown = steady(playback.times_s)
-    with writable_video(out, enlarged(playback.size), fps) as video:
+    with writable_video(out, enlarged(playback.size), usual_fps(playback.times_s)) as video:
         for i, image in overlaid(playback):
-            for _ in range(int(shown[i])):
-                video.write(image)
+            video.write(image, float(playback.times_s[i]))
             advance()
 
 

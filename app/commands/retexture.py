@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from app.arrays import Image
-from app.files.video_out import check_video_format, steady
+from app.files.video_out import check_video_format, usual_fps
 from app.files.writing import check_free
 from app.options.retexture import Retexture
 from app.options.run import parse_range
@@ -161,7 +161,7 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Played:
                 frame = Frame(number, float(playback.times_s[i]), image)
                 if not begun:
                     still = Frame(number, frame.time_s, first_frame(playback, i, image))
-                    painter.begin(still, playback.texture_px, model, steady(playback.times_s)[0])
+                    painter.begin(still, playback.texture_px, model, usual_fps(playback.times_s))
                     begun = True
                 if number < first:
                     continue

@@ -1,36 +1,36 @@
-"""Writing a video: frames go in, a file appears when it is complete."""
+"""Writing a video: frames with their times go in, a file appears when it is complete."""
 
 import os
-import shutil
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from fractions import Fraction
 from pathlib import Path
-from types import TracebackType
-from typing import Self
+from typing import cast
 
-import cv2
+import av
 import numpy as np
 
-from app.arrays import Array, Image, Indices
+from app.arrays import Array, Image
 from app.files.writing import moved_when_complete
 from app.terminal.errors import UsageError
 
-CODECS = {".mp4": "mp4v", ".webm": "VP80"}
-CHECKED_FRAMES = 30  # between two looks at the disk
-FULL_BYTES = 2**20  # so little left on a disk explains a failure
+CODECS = {".mp4": "libx264", ".webm": "libvpx-vp9"}  # H.264 plays everywhere, in browsers, too
+OPTIONS = {
+    "libx264": {"preset": "superfast", "crf": "20"},
+    "libvpx-vp9": {"deadline": "realtime", "cpu-used": "8", "crf": "30", "b": "0", "row-mt": "1"},
+}
+TICKS = 90_000  # a second: of the usual rates, each frame is a whole number of them
+USUAL_FPS = 25.0  # of a single frame
 
 
 @contextmanager
 def writable_video(path: Path, size: tuple[int, int], fps: float) -> Iterator["VideoSink"]:
     """A video that appears under its name only when complete.
 
-    .mp4 (MPEG-4 part 2) is written fast and plays in every player, but not in browsers; .webm (VP8) plays there too.
-
     Args:
-        path: the file, .mp4 or .webm.
+        path: the file, .mp4 (H.264) or .webm (VP9).
         size: (width, height) px of the frames; of odd ones the last row or column is not written.
-        fps: frames per second.
+        fps: frames per second, usually.
 
     Raises:
         UsageError: another format, no frame, or the file cannot be written.
@@ -40,9 +40,10 @@ def writable_video(path: Path, size: tuple[int, int], fps: float) -> Iterator["V
         sink = VideoSink(path, part, size, fps)
         try:
             yield sink
-        finally:
-            sink.release()
-        sink.check()
+        except BaseException:
+            sink.close(complete=False)
+            raise
+        sink.close()
 
 
 class VideoSink:
@@ -58,115 +59,74 @@ class VideoSink:
     """
 
     def __init__(self, path: Path, part: Path, size: tuple[int, int], fps: float) -> None:
-        self._path, self._part, self._size = path, part, size
+        self._path, self._size, self._step = path, size, max(1, round(TICKS / fps))
         codec = CODECS[path.suffix.lower()]
-        # Containers store a rate as a fraction: three digits are enough for it to be a short one.
-        with quiet():
-            self._writer = cv2.VideoWriter(str(part), cv2.VideoWriter.fourcc(*codec), round(fps, 3), size)
-        if not self._writer.isOpened():
-            raise UsageError(f"cannot write {path}: this OpenCV has no {codec} encoder, or the folder is not writable")
-        self._frames = 0
+        try:
+            self._file = av.open(str(part), "w", options={"movflags": "faststart"} if path.suffix.lower() == ".mp4" else {})
+            rate = Fraction(fps).limit_denominator(1001)
+            self._stream = cast(av.VideoStream, self._file.add_stream(codec, rate, options=OPTIONS.get(codec)))
+        except av.FFmpegError as error:
+            raise self._failure(error) from error
+        except ValueError:  # its error for this has no public name
+            raise UsageError(f"cannot write {path}: this PyAV has no {codec} encoder") from None
+        self._stream.width, self._stream.height = (side // 2 * 2 for side in size)
+        self._stream.pix_fmt = "yuv420p"
+        self._stream.time_base = self._stream.codec_context.time_base = Fraction(1, TICKS)
+        self._stream.codec_context.thread_count = min(8, os.cpu_count() or 1)
+        self._begun_s = 0.0
+        self._tick = -1  # of the last frame
 
-    def write(self, image: Image) -> None:
-        """The next frame, (H, W, 3) BGR.
+    def write(self, image: Image, time_s: float) -> None:
+        """The next frame, (H, W, 3) BGR, which is shown from this time on; the first at the video's begin.
 
         Raises:
             UsageError: the disk is full.
         """
-        assert image.shape[1::-1] == self._size, "OpenCV would drop the frame without a word"
-        self._writer.write(image)
-        self._frames += 1
-        if self._frames % CHECKED_FRAMES == 0 and self._full():
-            raise self._failure("the disk is full")
+        assert image.shape[1::-1] == self._size, "a frame of another size"
+        if self._tick < 0:
+            self._begun_s, tick = time_s, 0
+        else:
+            tick = round((time_s - self._begun_s) * TICKS)
+            tick = tick if tick > self._tick else self._tick + self._step
+        height, width = self._stream.height, self._stream.width
+        frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image[:height, :width]), format="bgr24")
+        frame.pts, frame.time_base, self._tick = tick, Fraction(1, TICKS), tick
+        self._put(frame)
 
-    def release(self) -> None:
-        """No more frames come."""
-        self._writer.release()
-
-    def check(self) -> None:
-        """Check that every frame can be read again and room is left: OpenCV does not tell when a disk is full.
+    def close(self, *, complete: bool = True) -> None:
+        """No more frames come.
 
         Raises:
-            UsageError: no frame was written, or not all of them.
+            UsageError: there was none, or they cannot be written.
         """
-        if self._frames == 0:
+        try:
+            if complete and self._tick >= 0:
+                self._put(None)
+            self._file.close()
+        except (av.FFmpegError, OSError) as error:
+            if complete:
+                raise self._failure(error) from error
+        if complete and self._tick < 0:
             raise UsageError(f"cannot write {self._path}: there is no frame to write")
-        if self._full():
-            raise self._failure("the disk is full")
-        with quiet():
-            written = cv2.VideoCapture(str(self._part))
-            frames = 0  # what a container announces says nothing: the head of a .webm is corrected in place
-            while frames < self._frames and written.grab():
-                frames += 1
-            written.release()
-        if frames < self._frames:
-            raise self._failure("the disk took only a part of it")
 
-    def _full(self) -> bool:
-        return shutil.disk_usage(self._part.parent).free < FULL_BYTES
+    def _put(self, frame: av.VideoFrame | None) -> None:
+        """Encode a frame, or what is left."""
+        try:
+            for packet in self._stream.encode(frame):
+                self._file.mux(packet)
+        except (av.FFmpegError, OSError) as error:
+            raise self._failure(error) from error
 
-    def _failure(self, reason: str) -> UsageError:
+    def _failure(self, error: Exception) -> UsageError:
+        reason = getattr(error, "strerror", None) or str(error)
         return UsageError(f"cannot write {self._path}: {reason}; free some space or choose another place with --out")
 
 
-class PacedVideo:
-    """Frames with times of their own in a video of constant rate: each is shown until the next one's time.
-
-    A context manager that at its end shows the last frame, too.
-
-    Args:
-        sink: the video.
-        fps: its rate.
-    """
-
-    def __init__(self, sink: VideoSink, fps: float) -> None:
-        self._sink, self._fps = sink, fps
-        self._shown: Image | None = None
-        self._begun_s = 0.0
-        self._frames = 0
-
-    def write(self, image: Image, time_s: float) -> None:
-        """The frame (H, W, 3) of a time; frames too close to be shown are left out."""
-        if self._shown is None:
-            self._begun_s = time_s
-        self._fill(round((time_s - self._begun_s) * self._fps))
-        self._shown = image
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if kind is None:
-            self._fill(self._frames + 1)
-
-    def _fill(self, frames: int) -> None:
-        while self._shown is not None and self._frames < frames:
-            self._sink.write(self._shown)
-            self._frames += 1
-
-
-def steady(times_s: Array) -> tuple[float, Indices]:
-    """Frames per second of a video, and how many times each frame (F,) is shown so that it keeps its time there."""
+def usual_fps(times_s: Array) -> float:
+    """Frames per second of a video with frames (F,) at these times."""
     steps = np.diff(times_s)
-    if not (steps > 0).any():
-        return 25.0, np.ones(len(times_s), np.int64)
-    fps = float(1 / np.median(steps[steps > 0]))
-    ticks = np.round((times_s - times_s[0]) * fps).astype(np.int64)
-    return fps, np.diff(ticks, append=ticks[-1] + 1).clip(0)
-
-
-@contextmanager
-def quiet() -> Iterator[None]:
-    """Nothing on stderr meanwhile: OpenCV warns of the codec's tag in .webm files that it then writes well."""
-    sys.stderr.flush()
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)
+    rising = steps[steps > 0]
+    return float(1 / np.median(rising)) if len(rising) else USUAL_FPS
 
 
 def check_video_format(path: Path) -> None:

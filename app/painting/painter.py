@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import Self
 
 from app.arrays import Array
-from app.files.video_out import PacedVideo, writable_video
+from app.files.video_out import VideoSink, writable_video
 from app.painting.compositing import Compositor, Placement
 from app.painting.picture import Texture
 from reconstruction.basis.model import Model
@@ -31,7 +31,7 @@ class Painter:
     def __init__(self, out: Path, texture: Texture, placement: Placement) -> None:
         self._out, self._texture, self._placement = out, texture, placement
         self._files = ExitStack()
-        self._video: PacedVideo | None = None
+        self._video: VideoSink | None = None
         self._compositor: Compositor | None = None
         self._begun_s = 0.0
         self._elapsed_s = 0.0
@@ -58,8 +58,7 @@ class Painter:
             first.image, points_px, model.mesh, perspective=perspective, placement=self._placement
         )
         height, width = first.image.shape[:2]
-        sink = self._files.enter_context(writable_video(self._out, (width, height), fps))
-        self._video = self._files.enter_context(PacedVideo(sink, fps))
+        self._video = self._files.enter_context(writable_video(self._out, (width, height), fps))
         self._begun_s = first.time_s
 
     def frame(self, frame: Frame, observation: Observation, estimate: ShapeEstimate | None) -> None:

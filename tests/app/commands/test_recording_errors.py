@@ -119,7 +119,7 @@ def test_a_codec_that_is_not_there(
 ) -> None:
     monkeypatch.setattr("app.files.video_out.CODECS", {".mp4": "XXXX", ".webm": "XXXX"})
     before = tree(files)
-    check(modeshape(*f"{command}.{ending}".split()), f"cannot write out.{ending}: this OpenCV has no XXXX encoder")
+    check(modeshape(*f"{command}.{ending}".split()), f"cannot write out.{ending}: this PyAV has no XXXX encoder")
     assert tree(files) == before
 
 

@@ -1,7 +1,6 @@
 """`modeshape retexture`: recordings and videos with a picture painted on the surface."""
 
 import json
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -151,16 +150,8 @@ def test_a_recording_without_pictures_is_refused(tmp_path: Path, texture: Path) 
 
 def test_a_codec_that_is_not_there(tmp_path: Path, sheet: Path, texture: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.files.video_out.CODECS", {".mp4": "XXXX", ".webm": "XXXX"})
-    with pytest.raises(UsageError, match=r"this OpenCV has no XXXX encoder"):
+    with pytest.raises(UsageError, match=r"this PyAV has no XXXX encoder"):
         retexture(command(sheet, texture, tmp_path / "new.webm"), Progress())
-    assert not list(tmp_path.glob("new*"))
-
-
-def test_a_disk_that_fills_up(tmp_path: Path, sheet: Path, texture: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr("app.files.video_out.shutil.disk_usage", lambda _: usage._replace(free=1000))
-    with pytest.raises(UsageError, match=r"cannot write .*new\.mp4: the disk is full"):
-        retexture(command(sheet, texture, tmp_path / "new.mp4"), Progress())
     assert not list(tmp_path.glob("new*"))
 
 

@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.files.video_out import PacedVideo, steady, writable_video
+from app.files.video_out import usual_fps, writable_video
 from app.terminal.errors import UsageError
 from tracking.video import Video
 
@@ -14,18 +15,28 @@ Image = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 
 
-def frames_of(path: Path) -> list[Image]:
+@pytest.mark.parametrize("ending", ["mp4", "webm"])
+def test_every_frame_is_written_once_and_keeps_its_time(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"uneven.{ending}"
+    shown = [(40, 5.0), (90, 5.1), (140, 5.4), (150, 5.41), (190, 7205.5)]
+    with writable_video(path, (64, 48), 10.0) as sink:
+        for level, time_s in shown:
+            sink.write(np.full((48, 64, 3), level, np.uint8), time_s)
+    with av.open(str(path)) as file:
+        frames = list(file.decode(video=0))
+    assert [frame.time for frame in frames] == pytest.approx([time_s - 5.0 for _, time_s in shown], abs=2e-3)
+    levels = [frame.to_ndarray(format="gray").mean() for frame in frames]
+    assert np.abs(np.array(levels) - [level for level, _ in shown]).max() < 5
+
+
+def test_times_that_do_not_rise_go_on_at_the_usual_rate(tmp_path: Path) -> None:
+    path = tmp_path / "standing.mp4"
+    with writable_video(path, (63, 49), 20.0) as sink:
+        for time_s in (1.0, 1.05, 1.05, 1.0, 1.3):
+            sink.write(np.zeros((49, 63, 3), np.uint8), time_s)
     with Video(str(path)) as video:
-        return [frame.image for frame in video]
-
-
-def test_frames_of_uneven_times_keep_them(tmp_path: Path) -> None:
-    path = tmp_path / "uneven.mp4"
-    with writable_video(path, (64, 48), 10.0) as sink, PacedVideo(sink, 10.0) as paced:
-        for level, time_s in ((40, 5.0), (90, 5.1), (140, 5.4), (150, 5.41), (190, 5.5)):
-            paced.write(np.full((48, 64, 3), level, np.uint8), time_s)
-    levels = [float(frame.mean()) for frame in frames_of(path)]
-    assert np.abs(np.array(levels) - (40, 90, 90, 90, 150, 190)).max() < 4
+        assert [frame.time_s for frame in video] == pytest.approx([0, 0.05, 0.1, 0.15, 0.3], abs=1e-3)
+        assert video.size == (62, 48)
 
 
 def test_a_video_without_frames_leaves_nothing(tmp_path: Path) -> None:
@@ -36,16 +47,7 @@ def test_a_video_without_frames_leaves_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("times", "fps", "shown"),
-    [
-        ([0, 0.1, 0.2, 0.3], 10, [1, 1, 1, 1]),
-        ([5, 5.1, 5.2, 5.5, 5.6], 10, [1, 1, 3, 1, 1]),
-        ([0, 0.1, 0.1, 0.2, 0.3], 10, [1, 0, 1, 1, 1]),
-        ([2.0], 25, [1]),
-        ([0, 0, 0], 25, [1, 1, 1]),
-    ],
+    ("times", "fps"), [([0, 0.1, 0.2, 0.3], 10), ([5, 5.1, 5.2, 5.5, 5.6], 10), ([2.0], 25), ([0, 0, 0], 25)]
 )
-def test_videos_keep_the_time(times: list[float], fps: float, shown: list[int]) -> None:
-    rate, counts = steady(np.array(times, float))
-    assert rate == pytest.approx(fps)
-    assert counts.tolist() == shown
+def test_the_usual_rate(times: list[float], fps: float) -> None:
+    assert usual_fps(np.array(times, float)) == pytest.approx(fps)

@@ -31,8 +31,8 @@ def frames_of(path: Path) -> list[Image]:
 def test_a_video_moves_on_the_surface_and_begins_again(tmp_path: Path) -> None:
     path = tmp_path / "moving.mp4"
     with writable_video(path, (64, 48), 10.0) as sink:
-        for level in (40, 90, 140, 190):
-            sink.write(np.full((48, 64, 3), level, np.uint8))
+        for k, level in enumerate((40, 90, 140, 190)):
+            sink.write(np.full((48, 64, 3), level, np.uint8), k / 10)
     with Texture(path) as texture:
         shown = [texture.at(t)[..., :3].copy() for t in (0.0, 0.05, 0.1, 0.25, 0.39, 0.4, 0.75, 0.81, 4.35)]
     frames = frames_of(path)  # as compressed: the grey levels are off by a few
