@@ -18,6 +18,7 @@ Log = Callable[[str], None]
 
 PATIENCE_S = 60.0  # a broken stream is waited for
 RETRY_S = 0.5  # between two attempts
+PROBED = 12  # frames: more than a decoder reorders
 TIMEOUT_MS = 5000  # a server that says nothing for so long is gone
 
 
@@ -105,6 +106,16 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
     if not file.isOpened():
         raise TrackingError(f"{source} cannot be decoded; it is not a video, or it is damaged or cut off")
     return cast(Capture, file)
+
+
+def times_rise(source: str) -> bool:
+    """Whether the first frames of a file have times that rise: of some OpenCV tells them in the decoder's order."""
+    capture = cv2.VideoCapture(source)
+    times: list[float] = []
+    while len(times) < PROBED and capture.grab():
+        times.append(capture.get(cv2.CAP_PROP_POS_MSEC))
+    capture.release()
+    return bool((np.diff(times) > 0).all())
 
 
 def is_camera(source: str) -> bool:

@@ -5,6 +5,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from queue import Empty, Full, Queue
 from time import monotonic
 from types import TracebackType
@@ -14,7 +15,7 @@ import cv2
 import numpy as np
 
 from tracking import Image, TrackingError
-from tracking.capture import Log, Reconnecting, announced_frames, as_bgr, is_camera, open_capture
+from tracking.capture import Log, Reconnecting, announced_frames, as_bgr, is_camera, open_capture, times_rise
 
 DEFAULT_FPS = 30.0  # of sources that do not tell
 DECODE_AHEAD = 4  # frames waiting in the queue: enough to hide decoding, little memory
@@ -89,6 +90,7 @@ class Video:
         self._began = monotonic()
         self._index = 0  # of the next frame grabbed
         self._time_s = -np.inf
+        self._timed = Path(source).is_file() and times_rise(source)
         fps = self._capture.get(cv2.CAP_PROP_FPS)
         self.fps = fps if 0.5 < fps < 1000.0 else DEFAULT_FPS
         self._announced = announced_frames(self._capture)
@@ -210,9 +212,11 @@ class Video:
             image = cast(Image, cv2.resize(image, self.size))  # a stream may change its resolution
         time_s = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
         if self.live:
-            time_s = monotonic() - self._began
-        if not np.isfinite(time_s) or time_s <= self._time_s or (time_s <= 0.0 and self._index > 0):
-            time_s = max(0.0 if self.live else self._index / self.fps, self._time_s + 1e-3)
+            time_s = max(monotonic() - self._began, self._time_s + 1e-3)
+        elif not self._timed:
+            time_s = self._index / self.fps
+        if not np.isfinite(time_s) or time_s <= self._time_s:
+            time_s = self._time_s + 1.0 / self.fps if self._index > 0 else 0.0
         self._time_s = time_s
         frame = Frame(self._index, time_s, image)
         self._index += 1

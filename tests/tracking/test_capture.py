@@ -9,6 +9,7 @@ import cv2
 import pytest
 
 from tracking import TrackingError
+from tracking.capture import times_rise
 from tracking.video import Frame, Video
 
 AV1 = Path(__file__).with_name("data") / "av1.mp4"
@@ -66,3 +67,10 @@ def test_opencv_keeps_quiet(tmp_path: Path) -> None:
     command = [sys.executable, "-c", code, str(AV1), str(tmp_path / "text.mp4"), "97"]
     done = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, text=True, check=True)
     assert done.stdout + done.stderr == ""
+
+
+def test_times_in_the_decoder_s_order_are_not_believed(shared_data: Path) -> None:
+    assert times_rise(str(shared_data / "kinect_paper.mp4"))
+    assert not times_rise(str(shared_data / "box.mp4"))
+    with Video(str(shared_data / "box.mp4"), stop=40) as video:
+        assert [frame.time_s for frame in video] == pytest.approx([k / video.fps for k in range(40)])
