@@ -21,8 +21,8 @@ class Export(Json, Overwrite, Online):
       ply    the same as PLY
       csv    a folder: points.csv (seen, projected, in 3-D), frames.csv (pose and camera path), lambda.csv, mesh.csv
       npz    the arrays of `run --shapes-out`, and observed and projected points, times, camera path
-      mp4    the video with mesh, points and reprojections drawn over it
-      webm   the same, for browsers
+      mp4    the video with mesh, points and reprojections drawn over it (H.264)
+      webm   the same as VP9
 
     Axes and units:
       camera axes (csv, npz, obj, ply): x right, y down, z forward, as the camera sees

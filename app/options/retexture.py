@@ -33,7 +33,7 @@ class Retexture(Json, Overwrite, Source):
     texture: Path
     """Picture (transparent where it has alpha) or video."""
     out: Path
-    """The new video: .mp4, or .webm for browsers."""
+    """The new video: .mp4 (H.264) or .webm (VP9)."""
     rrd: Path | None = None
     """Also keep a recording; only for videos."""
     view: bool = False
