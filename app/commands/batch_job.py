@@ -4,7 +4,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from app.files.writing import write_json
 from app.terminal.exit_code import ExitCode
 
 UNFINISHED = "unfinished"
+OUTPUTS = ("--tracks-out", "--shapes-out")
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Job:
             words = json.loads(self.report.read_text())
         except (OSError, ValueError):
             return None
-        mine = isinstance(words, dict) and words.get("source") == self.video
+        mine = isinstance(words, dict) and words.get("source") == self.video and words.get("options") == list(self.options)
         return words if mine and ("error" in words or self.recording.exists()) else None
 
 
@@ -61,7 +62,7 @@ def carry_out(job: Job, started: Callable[["subprocess.Popen[str]"], None] = lam
     if job.recording.exists():
         return {"source": job.video, "error": f"{job.recording} exists, and is not of this batch: move it away"}
     unfinished.parent.mkdir(parents=True, exist_ok=True)
-    arguments = ["run", job.video, *job.options, "--out", str(unfinished), "--overwrite", "--json"]
+    arguments = ["run", job.video, *own_outputs(job.options, job.name), "--out", str(unfinished), "--overwrite", "--json"]
     environment = dict(os.environ)
     if job.cores:
         environment["OPENCV_FOR_THREADS_NUM"] = str(job.cores)
@@ -81,16 +82,26 @@ def carry_out(job: Job, started: Callable[["subprocess.Popen[str]"], None] = lam
         error = reason(process.returncode, err)
         if process.returncode == ExitCode.BAD_INPUT:
             unfinished.unlink(missing_ok=True)
-            write_json(job.report, {"source": job.video, "error": error})
+            write_json(job.report, {"source": job.video, "options": list(job.options), "error": error})
         return {"source": job.video, "error": error}
     words: dict[str, object] = json.loads(out)
     unfinished.replace(job.recording)
-    words |= {"source": job.video, "recording": str(job.recording)}
+    words |= {"source": job.video, "options": list(job.options), "recording": str(job.recording)}
     for number in range(2, int(str(words.get("parts", 1))) + 1):
         part = unfinished.with_name(f"{job.name}-part{number}.rrd").replace(job.folder / f"{job.name}-part{number}.rrd")
         words["last_part"] = str(part)
     write_json(job.report, words)
     return words
+
+
+def own_outputs(options: Sequence[str], name: str) -> list[str]:
+    """Options in which each file that is written has the job's name in its own: s.npz becomes s-NAME.npz."""
+    own = list(options)
+    for i in range(1, len(own)):
+        if own[i - 1] in OUTPUTS:
+            path = Path(own[i])
+            own[i] = str(path.with_name(f"{path.stem}-{name}{path.suffix}"))
+    return own
 
 
 def reason(code: int, err: str) -> str:

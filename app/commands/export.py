@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from app.arrays import Array
-from app.files.writing import check_free, check_free_folder, writable, writable_folder
+from app.files.writing import check_free_folder, check_outputs, writable, writable_folder
 from app.options.export import Export
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
@@ -64,7 +64,7 @@ def export(command: Export, progress: Progress) -> Exported:
     if not playback.shaped.any():
         raise UsageError(f"{playback.path} contains no shape: run again for longer")
     if kind not in FOLDERS:
-        check_free(out, overwrite=command.overwrite)
+        check_outputs({"--out": out}, [command.recording], overwrite=command.overwrite)
     with progress:
         progress.expect(len(playback.frames) if kind in (*VIDEOS, "csv") else int(playback.shaped.sum()))
 

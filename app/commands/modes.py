@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from app.figures.modes_figure import modes_figure, spectrum, title_of
-from app.files.writing import check_free, writable
+from app.files.writing import check_outputs, writable
 from app.options.evaluate import Evaluate
 from app.options.modes import Modes
 from app.terminal.progress import Progress
@@ -43,7 +43,7 @@ def modes(command: Modes, progress: Progress) -> Drawn:
     Raises:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
     """
-    check_free(command.out, overwrite=command.overwrite)
+    check_outputs({"--out": command.out}, [command.source], overwrite=command.overwrite)
     with threadpool_limits(1), progress:
         recorded = not zipfile.is_zipfile(command.source)  # an .npz is one
         name, basis, mesh, metric = (of_recording if recorded else of_tracks)(command, progress)

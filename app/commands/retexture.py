@@ -11,7 +11,7 @@ import numpy as np
 
 from app.arrays import Image
 from app.files.video_out import check_video_format, usual_fps
-from app.files.writing import check_free
+from app.files.writing import check_outputs
 from app.options.retexture import Retexture
 from app.options.run import parse_range
 from app.painting.compositing import Placement
@@ -76,7 +76,8 @@ def retexture(command: Retexture, progress: Progress) -> Painted:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
     """
     check_video_format(command.out)
-    check_free(command.out, overwrite=command.overwrite)
+    inputs = (command.source, command.texture, command.mask)
+    check_outputs({"--out": command.out, "--rrd": command.rrd}, inputs, overwrite=command.overwrite)
     placement = Placement(command.place, command.opacity)
     with Texture(command.texture) as texture, Painter(command.out, texture, placement) as painter:
         way = play if is_recording(command.source) else follow if command.run.live else reconstruct

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from app.files.writing import check_free, writable
+from app.files.writing import check_outputs, writable
 from app.options.review import Review
 from app.playback.facts import Facts, facts
 from app.playback.measures import Reviewed, per_frame, reviewed
@@ -58,8 +58,8 @@ def review(command: Review, progress: Progress) -> Comparison:
         from app.playback.plots import check_format  # Matplotlib takes its time, and is not always wanted
 
         check_format(command.plot)
-    for path in (command.csv, command.plot):
-        check_free(path, overwrite=command.overwrite)
+    outputs = {"--csv": command.csv, "--plot": command.plot}
+    check_outputs(outputs, (command.recording, command.other), overwrite=command.overwrite)
     url = None
     if command.connect:
         from app.recording.viewer import running_viewer

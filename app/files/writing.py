@@ -5,27 +5,55 @@ import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from secrets import token_hex
 from tempfile import TemporaryDirectory
 from typing import BinaryIO
 
 from app.terminal.errors import UsageError
 
 
+def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | str | None], *, overwrite: bool) -> None:
+    """Check, before anything is computed, that files can be written, and that none is another or one that is read.
+
+    Args:
+        outputs: by the option that names it.
+        inputs: what is read, if it is a file.
+        overwrite: whether files may be replaced.
+
+    Raises:
+        UsageError: as of `check_free`, or two are the same.
+    """
+    read = {Path(one).resolve() for one in inputs if one is not None and Path(one).is_file()}
+    written: dict[Path, str] = {}
+    for option, path in outputs.items():
+        if path is None:
+            continue
+        place = path.resolve()
+        if place in read:
+            raise UsageError(f"{option} {path} is read from: choose another name")
+        if place in written:
+            raise UsageError(f"{written[place]} and {option} are the same file {path}: choose another name for one")
+        written[place] = option
+        check_free(path, overwrite=overwrite)
+
+
 def check_free(path: Path | None, *, overwrite: bool) -> None:
     """Check, before anything is computed, that a file can be written.
 
     Raises:
-        UsageError: it exists and may not be replaced, or its folder cannot be made.
+        UsageError: it exists and may not be replaced, is no file at all, or its folder cannot be made.
     """
     if path is None:
         return
+    if path.exists() and not path.is_file():
+        raise UsageError(f"{path} is {'a folder' if path.is_dir() else 'no regular file'}: choose another name")
     if path.exists() and not overwrite:
         raise UsageError(f"{path} exists: replace it with --overwrite, or choose another name")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         new = not path.exists()
         path.open("ab").close()
-        if new:  # and nothing else: a device is empty, too
+        if new:
             path.unlink()
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror}; choose another place") from error
@@ -49,6 +77,11 @@ def check_free_folder(folder: Path, *, overwrite: bool) -> None:
         raise UsageError(f"cannot write {folder}: {error.strerror}; choose another place") from error
 
 
+def unfinished(path: Path) -> Path:
+    """A path beside another, with the same ending, that nobody else has: hidden, since *.rrd means finished ones."""
+    return path.with_name(f".{token_hex(8)}.part{path.suffix}")
+
+
 @contextmanager
 def moved_when_complete(path: Path) -> Iterator[Path]:
     """A path beside a file's, with the same ending, to write it to; the file is moved to its place if nothing fails.
@@ -56,8 +89,9 @@ def moved_when_complete(path: Path) -> Iterator[Path]:
     Raises:
         UsageError: the file cannot be written.
     """
-    part = path.with_name(f".{path.stem}.part{path.suffix}")  # hidden: *.rrd means finished ones
+    part = unfinished(path)
     try:
+        part.open("x").close()
         yield part
         part.replace(path)
     except OSError as error:
@@ -84,9 +118,8 @@ def writable_folder(folder: Path, replaced: Iterable[str]) -> Iterator[Path]:
     Raises:
         UsageError: the files cannot be written.
     """
-    part = folder.with_name(f"{folder.name}.part")
+    part = unfinished(folder)
     try:
-        shutil.rmtree(part, ignore_errors=True)
         part.mkdir()
         yield part
         folder.mkdir(exist_ok=True)

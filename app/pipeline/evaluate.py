@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits
 
 from app.arrays import Array, Flags
 from app.files.mesh_file import rest_of_vertices
-from app.files.writing import check_free
+from app.files.writing import check_outputs
 from app.options.evaluate import Evaluate
 from app.pipeline.estimates import Collected, Scores, save_shapes, sigmas
 from app.pipeline.prepare import settings_of
@@ -77,7 +77,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
     Raises:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
     """
-    check_free(config.shapes_out, overwrite=config.overwrite)
+    check_outputs({"--shapes-out": config.shapes_out}, (config.tracks, config.rest_shape), overwrite=config.overwrite)
     tracks = Tracks.load(config.tracks)
     frames, _, points = tracks.W.shape
     rng = np.random.default_rng(config.seed)

@@ -10,7 +10,7 @@ from typing import Literal
 from threadpoolctl import threadpool_limits
 
 from app.files.names import RECORDINGS, free_name
-from app.files.writing import check_free
+from app.files.writing import check_outputs
 from app.options.run import Run
 from app.pipeline.final_pass import final_pass
 from app.pipeline.parts import Parts
@@ -55,8 +55,10 @@ class Session:
     def __init__(self, config: Run, progress: Progress, *, record: bool = True, launched: Launched | None = None) -> None:
         self._launched = launched
         self._config, self._progress, self._record_unnamed = config, progress, record
-        for path in (config.output.out, config.output.tracks_out, config.output.shapes_out):
-            check_free(path, overwrite=config.output.overwrite)
+        output = config.output
+        outputs = {"--out": output.out, "--tracks-out": output.tracks_out, "--shapes-out": output.shapes_out}
+        inputs = (config.source, config.mask, config.texture, config.ground_truth, config.rest_shape)
+        check_outputs(outputs, inputs, overwrite=output.overwrite)
         self._watch, self._counts, self._order = Stopwatch(), Counts(), InOrder()
         self._surface: Surface | None = None
         self._successor: Successor | None = None

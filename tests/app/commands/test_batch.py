@@ -7,11 +7,12 @@ import shutil
 import signal
 import subprocess
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from app.commands.batch_job import Job, reason
+from app.commands.batch_job import Job, own_outputs, reason
 from tests.app.command_line import ENVIRONMENT, PROGRAM, Command
 from tests.synthetic_run import verify
 
@@ -186,9 +187,10 @@ def test_reports_of_another_video_do_not_count(tmp_path: Path) -> None:
     job = Job("/a/x.mp4", "x", tmp_path)
     job.report.write_text(json.dumps({"source": "/b/x.mp4", "error": "no"}))
     assert job.done() is None
-    job.report.write_text(json.dumps({"source": "/a/x.mp4", "error": "no"}))
+    job.report.write_text(json.dumps({"source": "/a/x.mp4", "options": [], "error": "no"}))
     assert job.done() is not None
-    job.report.write_text(json.dumps({"source": "/a/x.mp4", "frames": 3}))
+    assert replace(job, options=("--points", "100")).done() is None
+    job.report.write_text(json.dumps({"source": "/a/x.mp4", "options": [], "frames": 3}))
     assert job.done() is None  # its recording is missing
     job.report.write_text('{"source": "/a/')
     assert job.done() is None
@@ -205,3 +207,8 @@ def test_reports_of_another_video_do_not_count(tmp_path: Path) -> None:
 )
 def test_reasons_are_told_in_one_line(code: int, err: str, words: str) -> None:
     assert reason(code, err) == words
+
+
+def test_every_job_has_files_of_its_own() -> None:
+    options = ("--points", "100", "--shapes-out", "out/s.npz")
+    assert own_outputs(options, "clip") == ["--points", "100", "--shapes-out", "out/s-clip.npz"]
