@@ -5,6 +5,7 @@ A window of n frames holds q, t, log s and Λ' = Λ/√p per frame. A frame's d 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -49,7 +50,12 @@ class State:
         return np.exp(self.log_s)[:, None, None] * rotation_from_quaternion(self.q)
 
     def matrices(self) -> Array:
-        """M = [sR', sR'Λ', (t; 0)] (n, 3, 4 + r)."""
+        """M = [sR', sR'Λ', (t; 0)] (n, 3, 4 + r); not to be changed."""
+        return self._matrices
+
+    @cached_property
+    def _matrices(self) -> Array:
+        """The same: a step's energy and its derivatives both ask for it."""
         A = self.scaled_rotations()
         M = np.zeros((len(self), 3, 4 + self.Lambda.shape[2]))
         M[:, :, :3], M[:, :, 3:-1], M[:, :2, -1] = A, A @ self.Lambda, self.t

@@ -49,22 +49,23 @@ def minimise(energy: Energy, data: Statistics, start: State, before: Previous | 
     state, damping, steps = energy.completed(start), solver.damping, 0
     before = before and replace(before, state=energy.completed(before.state))
     normal = linearise(energy, data, state, before)
+    value = normal.value
     while steps < solver.iterations:
         steps += 1
         trial = energy.completed(state.moved(damped_step(normal, damping), energy.rows))
-        value = evaluate(energy, data, trial, before)
-        gain = normal.value.sum() - value.sum()
+        tried = evaluate(energy, data, trial, before)
+        gain = value.sum() - tried.sum()
         if not gain > 0:  # also when not finite
-            if damping > 1e8 or abs(gain) <= 1e-14 * normal.value.sum():
+            if damping > 1e8 or abs(gain) <= 1e-14 * value.sum():
                 break
             damping *= 10
             continue
-        converged = gain <= solver.tolerance * normal.value.sum()
-        state, damping = trial, max(damping / 10, 1e-9)
-        if converged:
-            return Solution(state, value, steps)
+        enough = gain <= solver.tolerance * value.sum()
+        state, value, damping = trial, tried, max(damping / 10, 1e-9)
+        if enough or steps == solver.iterations:
+            break
         normal = linearise(energy, data, state, before, value)
-    return Solution(state, normal.value, steps)
+    return Solution(state, value, steps)
 
 
 def one_step(energy: Energy, data: Statistics, start: State) -> State:

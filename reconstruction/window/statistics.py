@@ -37,6 +37,10 @@ class Statistics:
     def __len__(self) -> int:
         return len(self.power)
 
+    def __add__(self, other: "Statistics") -> "Statistics":
+        """Of the points of both, frame by frame."""
+        return Statistics(self.gram + other.gram, self.cross + other.cross, self.power + other.power)
+
     @property
     def seen(self) -> float:
         """Share of the points that is seen in the first frame, by their weights."""
@@ -65,11 +69,11 @@ def frame_statistics(basis: Array, W: Array, weights: Array, focal: float) -> St
     Args:
         basis: B (K, p) with the row of ones last.
         W: (2, p) image points relative to the principal point, units of the rest shape; finite where weighted.
-        weights: (p,) visibility h, 0 or 1, or robust weights.
+        weights: (p,) visibility h, 0 or 1, or robust weights; or by how much these change.
         focal: focal length in the same units, `inf` for orthography.
     """
     K, p = basis.shape
-    seen = weights > 0
+    seen = weights != 0
     if not seen.all():
         basis, W, weights = basis[:, seen], W[:, seen], weights[seen]
     moments = np.empty((4, 1, len(weights)))

@@ -23,7 +23,7 @@ from reconstruction.window.terms import data_normal
 from reconstruction.window.uncertainty.uncertainty import Uncertainty
 
 ADJUST = Solver()
-TOGETHER = Solver(iterations=1)  # for all frames, once the newest is adjusted
+STEP = Solver(iterations=1)  # for all frames, once the newest is adjusted, and for that with other weights
 SHOW = Solver(iterations=8, tolerance=1e-2)  # for what is only shown: no later frame starts from it
 RELIABLE = 0.5  # weight above which a point counts for the pose of the first frame
 REWEIGHTINGS = 5  # most rounds of robust weights: one for clean points, more while gross outliers still pull
@@ -105,7 +105,7 @@ class SlidingWindow:
             found = self._other_bends(window, found)
         window = with_newest(window, found.state)
         if len(window) > 1:
-            window = minimise(self._energy, stack(self._data), window, self._before, TOGETHER).state
+            window = minimise(self._energy, stack(self._data), window, self._before, STEP).state
         found = self._reweighted(window, found, W, visible, weights)
         newest = float(found.value[0])
         # After a surprise the new level is the usual one: it is not asked about twice.
@@ -202,8 +202,8 @@ class SlidingWindow:
             before, weights = weights, robust_weights(left, visible)
             if np.abs(weights - before).sum() < REWEIGHTED * len(weights):
                 break
-            self._data[-1] = image_statistics(self.model, W, weights)
-            found = self._newest(with_newest(window, found.state))
+            self._data[-1] += image_statistics(self.model, W, weights - before)  # of few points
+            found = self._newest(with_newest(window, found.state), solver=STEP)
         return found
 
     def _weigh_rest(self, newest: State) -> None:
