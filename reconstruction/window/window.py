@@ -24,7 +24,7 @@ from reconstruction.window.uncertainty.uncertainty import Uncertainty
 
 ADJUST = Solver()
 STEP = Solver(iterations=1)  # for all frames, once the newest is adjusted, and for that with other weights
-SHOW = Solver(iterations=8, tolerance=1e-2)  # for what is only shown: no later frame starts from it
+SHOW = Solver(iterations=4, tolerance=1e-2)  # for what is only shown: no later frame starts from it
 RELIABLE = 0.5  # weight above which a point counts for the pose of the first frame
 REWEIGHTINGS = 5  # most rounds of robust weights: one for clean points, more while gross outliers still pull
 REWEIGHTED = 0.005  # share of the weights that must change for another round
