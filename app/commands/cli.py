@@ -19,6 +19,7 @@ from app.options.bench import Bench
 from app.options.evaluate import Evaluate
 from app.options.export import Export
 from app.options.modes import Modes
+from app.options.pick import FramePicture, Pick
 from app.options.reproduce import Reproduce
 from app.options.retexture import Retexture
 from app.options.review import Review
@@ -30,6 +31,8 @@ from app.terminal.exit_code import ExitCode
 # Each command: its options, and the function that carries it out, given options and progress; it returns a summary.
 COMMANDS: dict[str, tuple[type, str]] = {
     "run": (Run, "app.commands.run:run"),
+    "pick": (Pick, "app.commands.pick:pick"),
+    "frame": (FramePicture, "app.commands.pick:frame"),
     "evaluate": (Evaluate, "app.pipeline.evaluate:evaluate"),
     "demo": (Demo, "app.commands.demo:demo"),
     "review": (Review, "app.commands.review:review"),
@@ -43,7 +46,8 @@ COMMANDS: dict[str, tuple[type, str]] = {
 
 DESCRIPTION = """One ordinary video of a deforming surface becomes a moving 3-D mesh, live.
 
-Start with `modeshape demo`, then `modeshape run your_video.mp4 --roi X Y W H`."""
+Start with `modeshape demo`, then `modeshape run your_video.mp4`, or
+`modeshape pick your_video.mp4 --run` to draw where the surface is."""
 
 
 def main() -> NoReturn:

@@ -52,6 +52,11 @@ class Source:
     """Video file, image pattern (img%04d.png), camera index or URL."""
     roi: tuple[int, int, int, int] | None = None
     """Region with the surface in the first frame: X Y WIDTH HEIGHT in pixels; without it the whole frame."""
+    polygon: tuple[float, ...] | None = None
+    """Region with the surface in the first frame by its corners: X1 Y1 X2 Y2 X3 Y3 … in pixels."""
+    corners: tuple[float, float, float, float, float, float, float, float] | None = None
+    """The four corners of a sheet in the first frame, going round: X1 Y1 X2 Y2 X3 Y3 X4 Y4 in pixels; a region that knows
+    the sheet's outline."""
     search: bool = True
     """Look for the surface in the region, by what moves together in the first frames; without it, all of it is taken."""
     mask: Path | None = None
@@ -88,6 +93,12 @@ class Source:
         if self.points < FEWEST_POINTS:
             few = f"a surface cannot be told from {self.points} points"
             raise UsageError(f"--points {self.points} is too few: {few}; give {FEWEST_POINTS} and more, best 300 to 1000")
+        if self.corners is not None and self.polygon is not None:
+            raise UsageError("--corners and --polygon are two regions: give one of them")
+        if self.polygon is not None and (len(self.polygon) < 6 or len(self.polygon) % 2):
+            raise UsageError("--polygon needs three corners and more: give X1 Y1 X2 Y2 X3 Y3 …")
+        if self.corners is not None and not convex(self.corners):
+            raise UsageError("--corners are not those of a sheet: give its four corners, going round it")
         if self.duration is not None and not self.duration > 0:
             raise UsageError(f"--duration {self.duration} is no time: give seconds, more than 0")
         if self.size_mm is not None and not 0 < self.size_mm < float("inf"):
@@ -101,6 +112,11 @@ class Source:
             raise UsageError(f"--place {area} has no area: give X Y WIDTH HEIGHT, both sizes 1 and more")
         if not 0 <= self.opacity <= 1:
             raise UsageError(f"--opacity {self.opacity} is no opacity: give 0 to 1")
+
+    @property
+    def outline(self) -> tuple[float, ...] | None:
+        """The corners x, y, x, y, … px of a region that is no rectangle; None if it has none."""
+        return self.corners or self.polygon
 
     @property
     def frame_range(self) -> tuple[int, int | None]:
@@ -163,6 +179,14 @@ class Demo(Json):
 
     view: bool = False
     """Open the viewer and watch live."""
+
+
+def convex(corners: tuple[float, ...]) -> bool:
+    """Whether x, y, x, y, … go round a figure without crossing or caving in."""
+    points = list(zip(corners[::2], corners[1::2], strict=True))
+    ahead = zip(points, points[1:] + points[:1], points[2:] + points[:2], strict=True)
+    turns = [(b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0]) for a, b, c in ahead]
+    return all(turn > 0 for turn in turns) or all(turn < 0 for turn in turns)
 
 
 def parse_range(text: str) -> tuple[int, int | None]:

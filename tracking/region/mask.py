@@ -1,5 +1,6 @@
-"""The region of interest: a rectangle or a mask picture."""
+"""The region of interest: a rectangle, a polygon or a mask picture."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import cast
 
@@ -9,13 +10,19 @@ import numpy as np
 from tracking import Array, Image, TrackingError
 
 
-def region_mask(size: tuple[int, int], roi: tuple[int, int, int, int] | None = None, mask: Path | None = None) -> Image:
+def region_mask(
+    size: tuple[int, int],
+    roi: tuple[int, int, int, int] | None = None,
+    mask: Path | None = None,
+    polygon: Sequence[float] | None = None,
+) -> Image:
     """Where points are looked for: (H, W) uint8, 255 inside.
 
     Args:
         size: (width, height) of the video.
         roi: x, y, width, height of a rectangle in px; with `mask` too, what lies in both.
         mask: a picture of the video's size, inside where it is brighter than middle grey.
+        polygon: x, y, x, y, … of its corners in px, which may lie a little outside the picture; what lies in all of them.
 
     Raises:
         TrackingError: the rectangle leaves the picture; the mask is unreadable, of another size, or empty.
@@ -30,6 +37,14 @@ def region_mask(size: tuple[int, int], roi: tuple[int, int, int, int] | None = N
             raise TrackingError(f"the region {x} {y} {w} {h} (x y width height) leaves the picture of {width}x{height} px")
         inside = np.zeros_like(region)
         inside[y : y + h, x : x + w] = 255
+        region &= inside
+    if polygon is not None:
+        corners = np.rint(np.reshape(polygon, (-1, 2))).astype(np.int32)
+        inside = np.zeros_like(region)
+        cv2.fillPoly(inside, [corners], 255)
+        if not inside.any() or cv2.contourArea(corners) < 1:
+            told = " ".join(f"{value:g}" for value in polygon)
+            raise TrackingError(f"the corners {told} have no area in the picture of {width}x{height} px")
         region &= inside
     if not region.any():
         where = f"{mask}" if roi is None else f"{mask} within the region {roi[0]} {roi[1]} {roi[2]} {roi[3]}"

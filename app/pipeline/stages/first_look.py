@@ -35,8 +35,8 @@ def first_look(config: Source, video: Video) -> FirstLook:
     Raises:
         TrackingError: no frame with texture, or a region or mask that does not fit the picture.
     """
-    region, frames = region_mask(video.size, config.roi, config.mask), iter(video)
-    if not config.search:
+    region, frames = region_mask(video.size, config.roi, config.mask, config.outline), iter(video)
+    if not config.search or config.outline is not None:  # drawn by hand
         return FirstLook(frames, region, [])
     if video.live:
         kept: list[Frame] = []

@@ -167,7 +167,8 @@ class TrackingStage:
         except TrackingError as error:
             return error
         begun = Begun(points_px, outline(self._region))
-        self._region = region_mask(self.video.size, self._config.roi, self._config.mask)  # others may be anywhere in it
+        given = self._config
+        self._region = region_mask(self.video.size, given.roi, given.mask, given.outline)  # others may be anywhere in it
         self._trackers[one] = GuardedTracker(frame.image, points_px)
         return begun
 
