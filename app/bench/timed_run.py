@@ -18,7 +18,7 @@ def main() -> None:
     """Run with the options on the command line, which are those of `modeshape run` with --out."""
     command = tyro.cli(Run)
     from app.bench.own_process import peak_mb
-    from app.commands.run import run
+    from app.pipeline.session import Session
     from app.terminal.progress import Progress
 
     assert command.output.out is not None
@@ -44,7 +44,7 @@ def main() -> None:
             super().advance(phase, error_px)
 
     clock = Clock()
-    summary = run(command, clock)
+    summary = Session(command, clock).run()
     first, last = clock.used_s[0], clock.used_s[-1]
     told = {
         "stamps": clock.stamps,
