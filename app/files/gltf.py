@@ -11,7 +11,8 @@ What a file contains, and in which axes:
   so that weights lie in −1 … 1 as editors expect; entries of Λ that stay zero have no target. `extras` names the
   entry (`targetNames`: alpha 1 … tau r) and its factor in pixels (`unitsPx`).
 - Time 0 is the first frame; the camera node is the video's camera, if it has perspective.
-- The texture is a crop of the first frame. It has the scene's light in it, so the material is unlit.
+- The texture is a crop of the first frame, as sharp as that. The material is lit, rough and seen from both sides, so that
+  bends show; normals have morph targets, too: how they change with each weight, at rest.
 """
 
 from dataclasses import dataclass, replace
@@ -29,6 +30,7 @@ from reconstruction.camera import rotation_from_quaternion
 
 JPEG_QUALITY = 95
 LENGTH_M = 1.0  # of the rest shape along its first axis
+STEP = 0.25  # of a weight, over which normals are compared
 HALF_TURN_ABOUT_X = [1.0, 0.0, 0.0, 0.0]  # quaternion, w last as in glTF
 
 
@@ -68,7 +70,6 @@ def glb(moving: MovingMesh, name: str = "surface") -> bytes:
     weights, targets, names, units = morph_targets(moving)
     file = gltf.GLTF2(
         asset=gltf.Asset(version="2.0", generator=f"modeshape {version('modeshape')}"),
-        extensionsUsed=["KHR_materials_unlit"],
         scene=0,
         scenes=[gltf.Scene(nodes=[0])],
         nodes=[root(moving), first_pose(moving, name)],
@@ -80,7 +81,6 @@ def glb(moving: MovingMesh, name: str = "surface") -> bytes:
                 ),
                 doubleSided=True,
                 alphaCutoff=None,
-                extensions={"KHR_materials_unlit": {}},
             )
         ],
         textures=[gltf.Texture(sampler=0, source=0)],
@@ -165,15 +165,32 @@ def textured_mesh(
     """Rest shape, targets (n, p, 3), texture coordinates and triangles."""
     attributes = gltf.Attributes(
         POSITION=buffer.floats(moving.basis.rest.T, gltf.ARRAY_BUFFER, bounds=True),
+        NORMAL=buffer.floats(normals(moving.basis.rest.T, moving.faces), gltf.ARRAY_BUFFER),
         TEXCOORD_0=buffer.floats(moving.uv, gltf.ARRAY_BUFFER),
     )
-    morphs = [{"POSITION": buffer.floats(target, gltf.ARRAY_BUFFER, bounds=True)} for target in targets]
+    rest = moving.basis.rest.T
+    morphs = []
+    for target in targets:
+        ahead, behind = (normals(rest + side * target, moving.faces) for side in (STEP, -STEP))
+        position = buffer.floats(target, gltf.ARRAY_BUFFER, bounds=True)
+        morphs.append({"POSITION": position, "NORMAL": buffer.floats((ahead - behind) / (2 * STEP), gltf.ARRAY_BUFFER)})
     triangles = gltf.Primitive(
         attributes=attributes, indices=buffer.indices(moving.faces), material=0, targets=morphs or None
     )
     if not len(targets):
         return gltf.Mesh(primitives=[triangles])
     return gltf.Mesh(primitives=[triangles], weights=weights[0].tolist(), extras=extras)
+
+
+def normals(vertices: Array, faces: Indices) -> Array:
+    """Unit normals (p, 3) of vertices, of the triangles around each by their areas; where there is none, any."""
+    corners = vertices[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    summed = np.zeros_like(vertices)
+    for k in range(3):
+        np.add.at(summed, faces[:, k], area)
+    length = np.linalg.norm(summed, axis=1, keepdims=True)
+    return np.where(length > 0, summed / np.where(length > 0, length, 1.0), [0.0, 0.0, -1.0])
 
 
 def animation(moving: MovingMesh, buffer: Buffer, weights: Array) -> gltf.Animation:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.files.gltf import MovingMesh, glb
+from app.files.gltf import MovingMesh, glb, normals
 from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import rotation_from_quaternion
@@ -112,6 +112,20 @@ def test_many_vertices_take_long_indices(tmp_path, moving):
     )
     file = written(tmp_path, big)
     assert file.faces.max() == 60 * copies - 1
+
+
+def test_normals_follow_the_bends(tmp_path, moving):
+    file = written(tmp_path, moving)
+    assert not file.gltf.extensionsUsed
+    assert not file.gltf.materials[0].extensions
+    rest = file.accessor(file.primitive.attributes.NORMAL)
+    assert np.linalg.norm(rest, axis=1) == pytest.approx(1.0, abs=1e-5)
+    for weight in (0.3, -0.3):
+        target = file.primitive.targets[0]
+        bent = normals(moving.basis.rest.T + weight * file.accessor(target["POSITION"]), moving.faces)
+        told = rest + weight * file.accessor(target["NORMAL"])
+        told /= np.linalg.norm(told, axis=1, keepdims=True)
+        assert np.median((bent * told).sum(axis=1)) > 0.98
 
 
 def test_only_free_entries_have_targets(tmp_path, moving):
