@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.recording.recording import entities
+from app.recording.stream import Stream
 from app.terminal.errors import UsageError
 from tests.app.recording.rows import frame, read, record
 from tests.synthetic_run import STAGE_MS, Run, picture, verify
@@ -73,14 +74,14 @@ def test_an_unwritable_place_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(UsageError, match=r"cannot write .*x\.rrd: .*choose another place"):
         record(tmp_path / "file" / "x.rrd")
-    with pytest.raises(UsageError, match="choose another place"):
+    with pytest.raises(UsageError, match="is a folder: choose another name"):
         record(tmp_path, overwrite=True)
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
 def test_a_full_disk_is_an_error() -> None:
     with pytest.raises(UsageError, match="cannot write /dev/full"):
-        record(Path("/dev/full"), overwrite=True)
+        Stream(Path("/dev/full"), [])
 
 
 def test_without_file_and_viewer_nothing_happens() -> None:
