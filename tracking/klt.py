@@ -70,7 +70,7 @@ class PointTracker:
         Args:
             image_bgr: (H, W, 3) uint8, of the reference frame's size.
             predicted_px: (P, 2) where the model expects the points, NaN where it does not know; lost points
-                are taken up again near there. None while there is no model: lost points stay lost.
+                are taken up again near there. None while there is no model: they are where their neighbours went.
         """
         grays = Grays.of(image_bgr)
         fine, coarse = _pictures(grays)
@@ -136,15 +136,15 @@ class PointTracker:
     def _expected(self, points: Array, motion: LocalMotion, predicted_px: Array | None) -> Array:
         """Where to look for points that are not tracked now: (P, 2), NaN for nowhere.
 
-        Points seen in the last frame are looked for where their neighbours went, points lost before where the
-        model predicts, moved by what the prediction misses around them.
+        Points lost before are looked for where the model predicts, moved by what the prediction misses around them;
+        points seen in the last frame, and all while there is no model, where their neighbours went.
         """
+        predicted = np.full_like(points, np.nan) if predicted_px is None else predicted_px
+        before = np.isfinite(predicted).all(axis=1) & ~(np.isfinite(self._points[:, 0]) & (motion.support >= MIN_SUPPORT))
+        beside = ~before & (motion.support >= MIN_SUPPORT)
         expected = np.full_like(points, np.nan)
-        just_now = np.isfinite(self._points[:, 0]) & (motion.support >= MIN_SUPPORT)
-        expected[just_now] = motion.fitted_px[just_now]
-        if predicted_px is not None:
-            before = ~just_now & np.isfinite(predicted_px).all(axis=1)
-            expected[before] = (predicted_px + self._miss(points, predicted_px))[before]
+        expected[beside] = motion.fitted_px[beside]
+        expected[before] = (predicted + self._miss(points, predicted))[before]
         expected[np.isfinite(points[:, 0])] = np.nan
         return expected
 

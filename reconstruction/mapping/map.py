@@ -60,13 +60,13 @@ class Map:
         """
         if self.sheet is None or visible.sum() < FEWEST_POINTS:
             return None
-        found = self.sheet.shape_in(np.where(visible, W, 0.0), visible)
+        found, known = self.sheet.shape_in(np.where(visible, W, 0.0), visible)
         shape = self.unit_px * completed(found, self.rest.motion.shape)
         if last is not None and not self.camera.perspective:
             depth, before = shape[2] - shape[2].mean(), (last.matrices()[-1] @ model.B)[2]
             if depth @ (before - before.mean()) < 0:
                 shape[2] -= 2 * depth
-        return model.state_of(shape, self.sheet.camera.focal_px, visible, last)
+        return model.state_of(shape, self.sheet.camera.focal_px, known, last)
 
     def state_of(self, model: Model, shape: Array) -> State | None:
         """Pose and Λ' of a shape (3, p) in camera axes, px, by the modes of a sheet; None for a solid."""

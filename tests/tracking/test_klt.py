@@ -54,20 +54,18 @@ def test_an_observation_is_nan_exactly_where_not_visible() -> None:
     assert tracker.track(scene(0.15)[0]).visible.any()
 
 
-def test_hidden_points_are_lost_and_stay_lost_without_a_prediction() -> None:
+def test_hidden_points_are_lost_and_found_again_beside_others_without_a_prediction() -> None:
     tracker = PointTracker(IMAGE, POINTS)
     for k in STEPS[:3]:
         image, truth = scene(k)
         seen = tracker.track(hidden(image, 160))
-    behind = truth[:, 0] < 150
-    assert seen.visible[behind].mean() < 0.05
+    assert seen.visible[truth[:, 0] < 150].mean() < 0.05
     assert seen.visible[truth[:, 0] > 175].mean() > 0.9
-    lost = ~seen.visible
-    for k in STEPS[3:6]:
+    for k in STEPS[3:]:  # from neighbour to neighbour
         image, truth = scene(k)
         seen = tracker.track(image)
-        assert not seen.visible[lost].any()
-        assert not tracker.track(image, np.full_like(truth, np.nan)).visible[lost].any()
+    assert seen.visible.mean() > 0.95
+    assert np.percentile(errors(seen, truth), 98) < 0.5
 
 
 @pytest.mark.parametrize("miss", [(0.0, 0.0), (3.0, -2.0), (-6.0, 4.0)])

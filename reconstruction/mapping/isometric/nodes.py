@@ -32,6 +32,11 @@ class Nodes:
     variance: Array
     ends: Indices
 
+    def nearest(self, reference: Array) -> Indices:
+        """Which node (p,) is nearest to each of the points (2, p) in the reference image; any for those without a place."""
+        apart = ((np.nan_to_num(reference)[:, :, None] - self.reference[:, None]) ** 2).sum(axis=0)
+        return np.asarray(apart.argmin(axis=1))
+
     def in_frames(self, chosen: Indices) -> "Nodes":
         """The same in some of the keyframes."""
         return replace(self, images=self.images[chosen], variance=self.variance[chosen])

@@ -13,6 +13,7 @@ from reconstruction.mapping.isometric.smooth_field import SmoothField
 from reconstruction.mapping.isometric.warps import Warps, quick_fit
 
 QUICK_STEPS = 4
+HELD = 0.03  # of the image's RMS radius: how far a point that is not seen may be off where its neighbours put it
 STUCK = 1.3  # times the usual frame's change of length: a frame that may be in another minimum
 
 
@@ -75,12 +76,18 @@ class IsometricSheet:
         off = edges.log_lengths(c) - self.log_lengths
         return replace(self, warps=warps, nodes=nodes, coefficients=c, strain=edges.rms(off), change=usual(off))
 
-    def shape_in(self, W: Array, visible: Mask) -> Array:
-        """The shape (3, p) in one more frame W (2, p) px, visible (p,): `finish` to 0.2 %, in half the time."""
+    def shape_in(self, W: Array, visible: Mask) -> tuple[Array, Mask]:
+        """The shape in one more frame W (2, p) px, visible (p,): `finish` to 0.2 %, in half the time.
+
+        Returns:
+            (3, p) in camera axes, and which of its points (p,) are known: seen, or held by those around them.
+        """
         points = self.nodes.points
         image, variance = quick_fit(self.warps, W, visible, points)
         c, _ = self._depths(replace(self.nodes, images=image[None, :, points], variance=variance[None]), QUICK_STEPS)
-        return np.asarray(np.exp(c @ self.values.T) * rays_of(image[None], self.camera)[0])
+        held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
+        known = visible | held[self.nodes.nearest(self.warps.reference)]
+        return np.asarray(np.exp(c @ self.values.T) * rays_of(image[None], self.camera)[0]), known
 
     def _depths(self, nodes: Nodes, steps: int) -> tuple[Array, Edges]:
         """Coefficients (F, r) of log depths with which nodes keep their lengths in their images, and their edges."""

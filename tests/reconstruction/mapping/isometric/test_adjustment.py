@@ -63,7 +63,7 @@ def test_the_quick_shape_of_a_frame_is_that_of_finishing() -> None:
     W, _, _ = waving()
     found = sheet(W[::2], SEEN[::2], CAMERA)
     finished = found.finish(W[1::2], SEEN[1::2]).shapes()
-    quick = np.stack([found.shape_in(w, h) for w, h in zip(W[1::2], SEEN[1::2], strict=True)])
+    quick = np.stack([found.shape_in(w, h)[0] for w, h in zip(W[1::2], SEEN[1::2], strict=True)])
     assert np.median(e3d(quick, finished)) < 0.01
 
 
@@ -128,3 +128,10 @@ def test_what_stretches_is_no_sheet() -> None:
     W = W + 6 * np.sin(W[:, ::-1] / 20 + rng.uniform(0, 6, (15, 1, 1)))
     with pytest.raises(ReconstructionError, match="lengths change"):
         sheet(W, np.ones((15, 150), bool), CAMERA)
+
+
+def test_points_beside_seen_ones_are_known() -> None:
+    W, _, found = waving()
+    x = W[0, 0]
+    _, known = found.shape_in(W[0], x < np.quantile(x, 0.4))
+    assert known[x < np.quantile(x, 0.42)].all()
