@@ -33,8 +33,15 @@ class Output(Json, Overwrite):
     """How frames are stored in the recording: each as JPEG, the video file as it is, or not at all."""
     view: bool = False
     """Open the viewer and watch live."""
+    serve: bool = False
+    """Watch live in a browser of this machine, without a screen here or through a tunnel."""
     connect: str | None = None
     """Address (host:port) of a running viewer to watch live in."""
+
+    @property
+    def watched(self) -> bool:
+        """Whether somebody watches."""
+        return bool(self.connect or self.serve or self.view)
 
     def __post_init__(self) -> None:
         if self.split_minutes is not None:

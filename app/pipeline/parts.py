@@ -1,11 +1,12 @@
 """The files of a run's recording: one for each object, and of a long run one for so many minutes."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from app.files.names import beside
 from app.options.run import Output
 from app.recording.process import Recorder
+from app.recording.viewer import answers, opened_viewer
 
 
 class Parts:
@@ -14,14 +15,16 @@ class Parts:
     Args:
         recorder: writes them.
         path: of the first; None writes none.
-        output: says when another is due.
+        output: says when another is due, and where to watch.
+        log: where to report.
 
     Attributes:
         paths: of the files so far.
     """
 
-    def __init__(self, recorder: Recorder, path: Path | None, output: Output) -> None:
+    def __init__(self, recorder: Recorder, path: Path | None, output: Output, log: Callable[[str], None]) -> None:
         self._recorder, self._path, self._output = recorder, path, output
+        self._viewer = opened_viewer(path, output, log)
         self.paths: list[Path] = []
         self._opened_s = 0.0
 
@@ -32,7 +35,8 @@ class Parts:
         if path is not None and part > 1:
             path = beside(path, f"part{part}", overwrite=self._output.overwrite)
         self.paths += [path] if path else []
-        self._recorder.tell("open", path, **options)
+        watched = self._viewer is not None and answers(self._viewer)  # it may have been closed
+        self._recorder.tell("open", path, connect=self._viewer if watched else None, **options)
 
     def due(self, time_s: float) -> bool:
         """Whether it is time for another."""

@@ -80,7 +80,7 @@ class Session:
             UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
         """
         output = self._config.output
-        needed = bool(self._record_unnamed or output.out or output.connect or output.view)
+        needed = bool(self._record_unnamed or output.out or output.watched)
         self._wanted_again = needed or bool(output.shapes_out or self._config.ground_truth)
         launched = self._launched or Launched(self._config.jobs, record=needed)
         with threadpool_limits(1), launched, Stages(self._config, launched) as stages:
@@ -95,7 +95,7 @@ class Session:
             with stages.recording(needed=needed) as self._recording, self._progress:
                 self._watch.start()
                 self._progress.expect(self._tracking.opened.frame_count)
-                self._parts = Parts(self._recording, path, output)
+                self._parts = Parts(self._recording, path, output, self._progress.log)
                 self.recordings = self._parts.paths
                 self._parts.open(first.time_s, self._object.recording_options)
                 self._recording.tell("region", first.index, first.time_s, first.begun(0).outline)

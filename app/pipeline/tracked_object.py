@@ -119,8 +119,6 @@ class TrackedObject:
         return {
             "configuration": configuration(self.config),
             "size": (width, height),
-            "connect": output.connect,
-            "view": output.view,
             "image": output.image,
             "video": Path(self.config.source),
             "overwrite": output.overwrite,

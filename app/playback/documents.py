@@ -24,7 +24,7 @@ def events(rows: Rows) -> list[tuple[int, float, str, str]]:
     """Frame, time in seconds, level and text of what happened."""
     levels = {row.id: cast(list[str], row.value)[0] for row in rows.all(entities.EVENTS, "TextLog:level")}
     return [
-        (row.frame, row.time_s, levels.get(row.id, "INFO"), cast(list[str], row.value)[0])
+        (row.frame, row.time_s, levels.get(row.id, "INFO"), " ".join(cast(list[str], row.value)[0].split("\n")))
         for row in rows.all(entities.EVENTS, "TextLog:text")
     ]
 

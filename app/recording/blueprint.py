@@ -61,10 +61,16 @@ def blueprint(*, live: bool = False) -> rrb.Blueprint:
                         origin=f"/{entities.MODES}",
                         background=BACKGROUND,
                         line_grid=False,
-                        eye_controls=eye((0.0, 0.0, -2.1)),
+                        eye_controls=eye((0.0, 0.0, -1.6)),
                     ),
                     curves("Milliseconds per stage", entities.TIMING, (0.0, SLOW_MS)),
-                    rrb.TextLogView(name="Events", origin=entities.EVENTS),
+                    rrb.TextLogView(
+                        name="Events",
+                        origin=entities.EVENTS,
+                        columns=rrb.TextLogColumns(
+                            timeline_columns=[entities.FRAME, entities.TIME], text_log_columns=["loglevel", "body"]
+                        ),
+                    ),
                     rrb.TextDocumentView(name="Summary", origin=entities.SUMMARY),
                     rrb.TextDocumentView(name="Configuration", origin=entities.CONFIGURATION),
                 ),

@@ -58,7 +58,7 @@ def small_multiples(basis: ModalBasis, mesh: Mesh) -> Iterator[tuple[str, Loggab
     for mode, shape in zip(modes, shapes, strict=True):
         row, column = divmod(mode, COLUMNS)
         place = np.array([column - (min(len(shapes), COLUMNS) - 1) / 2, row - (rows - 1) / 2, 0.0]) * size
-        names[mode] = scale * (place - (0.0, size[1] / 2, 0.0))
+        names[mode] = scale * (place - (0.0, 0.56 * size[1], 0.0))
         yield (
             f"{entities.MODES}/{mode + 1}",
             rr.Mesh3D(

@@ -5,6 +5,7 @@ What is written where is listed in `app.recording.entities`.
 
 from collections.abc import Mapping
 from pathlib import Path
+from textwrap import fill
 from types import TracebackType
 from typing import Literal, Self
 
@@ -20,7 +21,7 @@ from app.recording.images import cropped, embedded_video, jpeg, texture
 from app.recording.modes import small_multiples
 from app.recording.stream import Stream
 from app.recording.styles import coefficient_styles, model_components, placement, styles, waiting_for
-from app.recording.viewer import running_viewer, spawned_viewer
+from app.recording.viewer import running_viewer
 from app.recording.wireframe import NO_STRIPS, Strips
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
@@ -32,6 +33,7 @@ from tracking.klt import Observation
 from tracking.video import Frame
 
 NOWHERE = np.empty((0, 2))
+WRAP = 76  # letters in a line of the events' view
 
 
 class Recording:
@@ -42,7 +44,6 @@ class Recording:
         configuration: what the run was asked to do; stored with the version.
         size: (width, height) of the picture, px.
         connect: address of a running viewer, host:port or a rerun+http URL.
-        view: start a viewer.
         image: how frames are stored: each as JPEG, the video file as it is, or not at all.
         video: the source's file, for image="video".
         overwrite: replace an existing file.
@@ -61,7 +62,6 @@ class Recording:
         configuration: Mapping[str, object],
         size: tuple[int, int],
         connect: str | None = None,
-        view: bool = False,
         image: Literal["jpeg", "video", "none"] = "jpeg",
         video: Path | None = None,
         overwrite: bool = False,
@@ -87,8 +87,6 @@ class Recording:
             asset, self._video_ns = embedded_video(video)
         if path is not None:
             check_free(path, overwrite=overwrite)
-        if view:
-            urls.append(spawned_viewer())
         self._drawn_later = final_pass and not urls
         self._stream = Stream(path, urls)
         if path is not None:
@@ -195,7 +193,7 @@ class Recording:
     def event(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:
         """Something that happened, in words."""
         with self._stream.frame(index, time_s):
-            self._stream.row(entities.EVENTS, rr.TextLog.columns, text=[text], level=[level])
+            self._stream.row(entities.EVENTS, rr.TextLog.columns, text=[fill(text, WRAP)], level=[level])
 
     def modes(self, basis: ModalBasis, mesh: Mesh) -> None:
         """The first mode shapes, beside each other."""

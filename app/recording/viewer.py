@@ -2,15 +2,17 @@
 
 import socket
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 from time import monotonic, sleep
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 import rerun_cli  # type: ignore[import-untyped]
 
+from app.options.run import Output
 from app.terminal.errors import UsageError
 
-PORT = 9876
+PORT, WEB_PORT = 9876, 9090
 TIMEOUT_S = 1.0
 STARTED_S = 0.5  # after which one without a screen has ended
 START_S = 15.0  # until a viewer answers
@@ -34,16 +36,51 @@ def running_viewer(address: str) -> str:
     return f"{parts.scheme}://{host}:{port}/proxy"
 
 
-def spawned_viewer() -> str:
-    """The URL of a viewer on this machine, started unless one is running already.
+def opened_viewer(path: Path | None, output: Output, log: Callable[[str], None]) -> str | None:
+    """The URL of the viewer that a run is to be watched in, which is started if it does not run; None without one.
+
+    Args:
+        path: where the run is recorded; None: nowhere.
+        output: says what is wanted.
+        log: where to report.
+
+    Raises:
+        UsageError: there is none, and no file to look at later.
+    """
+    if output.connect:
+        return running_viewer(output.connect)
+    if output.serve:
+        url = spawned_viewer(in_browser=True)
+        log(f"watch it in a browser of this machine: http://127.0.0.1:{WEB_PORT}/?url={quote(url, safe='')}")
+        return url
+    if not output.view:
+        return None
+    try:
+        return spawned_viewer()
+    except UsageError as error:
+        if path is None:
+            raise
+        log(f"{error}: {path}")
+        return None
+
+
+def answers(url: str) -> bool:
+    """Whether a viewer listens at its URL."""
+    parts = urlsplit(url)
+    return listening(str(parts.hostname), parts.port or PORT)
+
+
+def spawned_viewer(*, in_browser: bool = False) -> str:
+    """The URL of a viewer on this machine, started unless one is running already, in a window or for a browser.
 
     Raises:
         UsageError: it does not start.
     """
     if not listening("127.0.0.1", PORT):
+        how = ["--serve-web", "--web-viewer-port", str(WEB_PORT)] if in_browser else ["--expect-data-soon"]
         program = Path(rerun_cli.__file__).with_name("rerun")  # of this very version, whatever is on PATH
         # Not by rr.spawn: it would be open to the whole network.
-        command = [str(program), "--bind", "127.0.0.1", "--port", str(PORT), "--hide-welcome-screen", "--expect-data-soon"]
+        command = [str(program), "--bind", "127.0.0.1", "--port", str(PORT), "--hide-welcome-screen", *how]
         quiet = subprocess.DEVNULL
         try:
             viewer = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from app.options.run import Output
 from app.recording import viewer
 from app.terminal.errors import UsageError
 
@@ -36,6 +37,31 @@ def test_it_listens_on_this_machine_only(program: Path) -> None:
     program.chmod(0o755)
     assert viewer.spawned_viewer() == f"rerun+http://127.0.0.1:{viewer.PORT}/proxy"
     assert program.with_name("rerun.bind").read_text() == "127.0.0.1"
+
+
+def test_in_a_browser_the_address_is_told(program: Path) -> None:
+    program.write_text(
+        f"#!{sys.executable}\n{LISTENS.replace('sys.argv[1::2], sys.argv[2::2]', 'sys.argv[1:], sys.argv[2:]')}"
+    )
+    program.chmod(0o755)
+    told: list[str] = []
+    url = viewer.opened_viewer(None, Output(serve=True), told.append)
+    assert url == f"rerun+http://127.0.0.1:{viewer.PORT}/proxy"
+    assert viewer.answers(url)
+    [line] = told
+    assert f"http://127.0.0.1:{viewer.WEB_PORT}/?url=rerun%2Bhttp" in line
+
+
+def test_without_a_screen_a_run_is_recorded_all_the_same(program: Path) -> None:
+    program.write_text(f"#!{sys.executable}\nraise SystemExit(1)\n")
+    program.chmod(0o755)
+    told: list[str] = []
+    assert viewer.opened_viewer(Path("run.rrd"), Output(view=True), told.append) is None
+    [line] = told
+    assert "is there a screen" in line
+    assert line.endswith("run.rrd")
+    with pytest.raises(UsageError, match="does not start"):
+        viewer.opened_viewer(None, Output(view=True), told.append)
 
 
 @pytest.mark.parametrize("text", [None, f"#!{sys.executable}\nraise SystemExit(1)\n"])
