@@ -7,7 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from app.arrays import Array
+from app.arrays import Array, Indices
 from app.files.writing import writable
 from app.pipeline.quality.ruler import Ruler
 from app.pipeline.quality.verdict import Course
@@ -78,14 +78,31 @@ class Collected:
         Raises:
             ReconstructionError: the truth points lie outside the mesh.
         """
+        both = self._both(truth, rest, mesh)
+        if both is None:
+            return None
+        found, still, S, frames = both
+        return score(found[:, :3], still, S, frames, found[:, 3] if found.shape[1] > 3 else None)
+
+    def true_shapes(self, truth: Truth, rest: Array, mesh: Mesh) -> dict[int, Array]:
+        """True points (n, 3) by source frame, as large as ours and in the same place; errors as of `score_against`."""
+        both = self._both(truth, rest, mesh)
+        if both is None:
+            return {}
+        found, _, S, frames = both
+        middle, S = found[:, :3].mean(axis=2, keepdims=True), S - S.mean(axis=2, keepdims=True)
+        scale = np.linalg.norm(found[:, :3] - middle) / np.linalg.norm(S)
+        return {int(frame): points.T for frame, points in zip(frames, scale * S + middle, strict=True)}
+
+    def _both(self, truth: Truth, rest: Array, mesh: Mesh) -> tuple[Array, Array, Array, Indices] | None:
+        """Ours (K, 3, n), or 4 with sigma, that at rest (3, n), the true shapes (K, 3, n), and their frames (K,)."""
         chosen = [k for k, frame in enumerate(truth.frames) if int(frame) in self.estimates]
         if not chosen:
             return None
         kept = [self.estimates[int(truth.frames[k])] for k in chosen]
         known = [e.shape if e.sigma is None else np.vstack([e.shape, e.sigma]) for e in kept]
         found, still, inside = followed(known, [e.projection_px for e in kept], rest, mesh, truth.W_px[chosen[0]].T)
-        sigma = found[:, 3] if found.shape[1] > 3 else None
-        return score(found[:, :3], still, truth.S[chosen][:, :, inside], truth.frames[chosen], sigma)
+        return found, still, truth.S[chosen][:, :, inside], truth.frames[chosen]
 
 
 @dataclass(frozen=True)

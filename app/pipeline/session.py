@@ -217,6 +217,7 @@ class Session:
         if self._surface is not None:
             model = self._object.reconstruction.model
             self._recording.tell("modes", model.basis, model.mesh)
+            self._recording.tell("truth", self._object.true_shapes())
         self._object.save()
         if failed is not None:
             raise failed

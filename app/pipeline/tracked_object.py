@@ -194,6 +194,13 @@ class TrackedObject:
         rest = self.reconstruction.rest
         return known.mm_per_px(along=rest is None or rest.kind != "rigid") if known else None
 
+    def true_shapes(self) -> dict[int, Array]:
+        """The truth (n, 3) by source frame, where its shapes are; nothing without one, or before there is a shape."""
+        rest = self.reconstruction.rest
+        if self._truth is None or rest is None:
+            return {}
+        return self.collected.true_shapes(self._truth, rest.motion.shape, self.reconstruction.model.mesh)
+
     def save(self) -> None:
         """Write the files asked for.
 

@@ -12,7 +12,7 @@ Static:
 - `/`, `world`: ViewCoordinates RDF: x right, y down, z forward, as a camera sees.
 - `world/mesh`: Mesh3D triangle_indices (m, 3), vertex_texcoords (p, 2), albedo_texture (crop of the
   first frame); Transform3D, which gives the first shape unit size at the origin of the 3-D view (readers
-  of the vertices ignore it).
+  of the vertices ignore it), as that of `world/truth`.
 - `world/camera`: Pinhole with intrinsics and resolution, Transform3D; for perspective cameras only.
 - `world/camera/image`: Transform3D by half a pixel: everywhere here pixel centres are at whole numbers.
 - `model/<n>`: the n-th model, from 0: modeshape.Model with rest S̄ (3p), Upsilon Υ (rp), eigenvalues (r), Phi Φ (9),
@@ -39,6 +39,10 @@ Every frame:
 Until there is a shape:
 
 - `world/status`: Points3D without a size, whose label says what is waited for.
+
+Frames whose truth is known, when the run is complete:
+
+- `world/truth`: Points3D, true points in the size and at the place of the shape.
 
 The first frame:
 

@@ -73,7 +73,7 @@ class Recording:
         self._models = 0
         self._size, self._image = size, image
         self._video_ns: Indices = np.empty(0, np.int64)
-        self._frames = 0
+        self._frames, self._times = 0, dict[int, float]()
         self._last_seen: Array = NOWHERE
         self._without_shape: set[int] = set()  # frames that said so
         self._model: Model | None = None
@@ -128,6 +128,7 @@ class Recording:
             if visible.size:
                 self._stream.scalars(entities.VISIBLE, visible.mean())
             self._frames += 1
+            self._times[frame.index] = frame.time_s
 
     def region(self, index: int, time_s: float, outline: list[Array]) -> None:
         """The borders (n, 2) px of the region that the points of a frame are from; they are shown in that frame."""
@@ -199,6 +200,12 @@ class Recording:
         """The first mode shapes, beside each other."""
         if self._stream.open:
             self._stream.static(small_multiples(basis, mesh))
+
+    def truth(self, shapes: Mapping[int, Array]) -> None:
+        """True points (n, 3) of some frames, where the shapes are."""
+        for index, points in shapes.items():
+            with self._stream.frame(index, self._times[index]):
+                self._stream.row(entities.TRUTH, rr.Points3D.columns, positions=points.astype(np.float32))
 
     def summary(self, values: Mapping[str, object]) -> None:
         """What came out of the run."""

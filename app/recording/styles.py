@@ -35,7 +35,7 @@ HELP = """\
 
 **Mesh**: the surface in three dimensions, with the colours of the first frame, seen a little from the side of the camera.
 Drag to turn it, scroll to come nearer. Below it the same from the side: blue is near, red is far; with `--uncertainty`,
-white is sure, red is not.
+white is sure, red is not. Green points are the truth, where there is one.
 
 **Video**: each frame with the mesh on it. Green points were seen in the frame, orange ones are hidden and drawn where the
 model says they are, red ones are lost.
@@ -62,6 +62,7 @@ def styles() -> Iterator[tuple[str, Loggable]]:
         # A negative radius is in points of the screen: the same size at every zoom.
         yield entity, rr.Points2D.from_fields(class_ids=k, radii=-2.0, draw_order=30 + k, show_labels=False)
     yield entities.STATUS, rr.Points3D.from_fields(radii=0.0, show_labels=True, colors=(205, 210, 220))
+    yield entities.TRUTH, rr.Points3D.from_fields(radii=-1.5, colors=SEEN_RGB)
     yield entities.WIREFRAME, rr.LineStrips2D.from_fields(colors=[WIREFRAME_RGBA], radii=-0.5, draw_order=20)
     yield entities.REGION, rr.LineStrips2D.from_fields(colors=[PREDICTED_RGB], radii=-1.0, draw_order=25)
     # The viewer's pixels are squares between whole numbers; ours, like OpenCV's, have their centres there.
@@ -86,7 +87,8 @@ def placement(vertices: Array, camera: Camera, size: tuple[int, int]) -> Iterato
     """Gives the first shape (p, 3) unit size at the origin, where the blueprint's eye looks."""
     center = vertices.mean(axis=0)
     scale = 1.0 / max(float(np.sqrt(np.mean(np.sum((vertices - center) ** 2, axis=1)))), 1e-9)
-    yield entities.MESH, rr.Transform3D(translation=-scale * center, scale=scale)
+    for entity in (entities.MESH, entities.TRUTH):
+        yield entity, rr.Transform3D(translation=-scale * center, scale=scale)
     if camera.perspective:
         # The viewer has no scaled cameras, and needs none: moved like the mesh, the camera sees the same.
         yield entities.CAMERA, rr.Transform3D(translation=-scale * center)
