@@ -52,7 +52,7 @@ def reconstruct(
 
     Args:
         source: video file, image pattern (img%04d.png), camera index or URL.
-        region: x, y, width, height px of the surface in the first frame; without it the whole frame.
+        region: x, y, width, height px of the surface in the first frame; without it, the whole frame is searched.
         mask: picture of the video's size, white where the surface is in the first frame.
         frames: the first frame, and the one after the last or None.
         points: most points tracked.

@@ -58,7 +58,7 @@ class Source:
     source: tyro.conf.Positional[str]
     """Video file, image pattern (img%04d.png), camera index or URL."""
     roi: tuple[int, int, int, int] | None = None
-    """Region with the surface in the first frame: X Y WIDTH HEIGHT in pixels; without it the whole frame."""
+    """Region with the surface in the first frame: X Y WIDTH HEIGHT in pixels; without it, the whole frame is searched."""
     polygon: tuple[float, ...] | None = None
     """Region with the surface in the first frame by its corners: X1 Y1 X2 Y2 X3 Y3 … in pixels."""
     corners: tuple[float, float, float, float, float, float, float, float] | None = None

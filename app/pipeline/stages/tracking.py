@@ -137,11 +137,11 @@ class TrackingStage:
         Raises:
             UsageError, TrackingError: the source breaks off, or a region, mask or mesh does not fit the picture.
         """
-        began = perf_counter()
         if self._frames is None:
             look = first_look(self._config, self.video)
             self._frames, self._region = look.frames, look.region
             self._told += look.notes
+        began = perf_counter()
         frame = next(self._frames, None)
         if frame is None:
             return None
