@@ -215,8 +215,7 @@ class Session:
             self.summary = self._summary(self._first_object)
         self._recording.tell("summary", self._summary(self._object).as_dict())
         if self._surface is not None:
-            model = self._object.reconstruction.model
-            self._recording.tell("modes", model.basis, model.mesh)
+            self._recording.tell("modes", *self._object.surface.recorded[:2])
             self._recording.tell("truth", self._object.true_shapes())
         self._object.save()
         if failed is not None:
