@@ -15,6 +15,7 @@ from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary
+from reconstruction.basis.surface import Surface
 
 FOLDERS = ("obj", "ply", "csv")  # formats with more than one file
 VIDEOS = ("mp4", "webm")
@@ -72,7 +73,7 @@ def export(command: Export, progress: Progress) -> Exported:
             progress.advance("writing")
 
         if kind == "glb":
-            write_glb(playback, out)
+            write_glb(playback, out, command.color)
         elif kind == "npz":
             from app.playback.tables import write_npz
 
@@ -99,7 +100,7 @@ def export(command: Export, progress: Progress) -> Exported:
     )
 
 
-def write_glb(playback: Playback, out: Path) -> None:
+def write_glb(playback: Playback, out: Path, color: Literal["picture", "strain", "curvature"] = "picture") -> None:
     """An animated mesh; frames without a shape hold the last one."""
     from app.files.gltf import MovingMesh, glb
 
@@ -123,9 +124,20 @@ def write_glb(playback: Playback, out: Path) -> None:
         scale=scale,
         Lambda=held(playback.estimates.Lambda),
         field_of_view=view,
+        colors=None if color == "picture" else greatest(playback, color),
     )
     with writable(out) as file:
         file.write(glb(moving, playback.name))
+
+
+def greatest(playback: Playback, what: Literal["strain", "curvature"]) -> Array:
+    """Colours (p, 3) from blue over white to red of the greatest strain or curvature of each vertex, of either sign."""
+    surface = Surface(playback.basis.rest, playback.mesh.faces)
+    of = surface.strain if what == "strain" else surface.curvature
+    values = np.stack([of(shape) for shape in playback.shapes()[playback.shaped]])
+    values = np.nan_to_num(values)[np.abs(np.nan_to_num(values)).argmax(axis=0), np.arange(values.shape[1])]
+    level = (values / max(float(np.quantile(np.abs(values), 0.98)), 1e-12)).clip(-1, 1)[:, None]
+    return np.asarray(np.where(level > 0, [1.0, 0.1, 0.05], [0.05, 0.2, 1.0]) * np.abs(level) + 1 - np.abs(level))
 
 
 def write_meshes(playback: Playback, folder: Path, command: Export, advance: Callable[[], None]) -> None:

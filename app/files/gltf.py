@@ -49,6 +49,7 @@ class MovingMesh:
         scale: (F,) 1 for perspective cameras.
         Lambda: (F, 3, r) px.
         field_of_view: vertical angle in radians and width / height of the picture; None for an orthographic camera.
+        colors: (p, 3) of the vertices, 0 … 1 linear, instead of the picture; None for that.
     """
 
     basis: ModalBasis
@@ -61,6 +62,7 @@ class MovingMesh:
     scale: Array
     Lambda: Array
     field_of_view: tuple[float, float] | None = None
+    colors: Array | None = None
 
 
 def glb(moving: MovingMesh, name: str = "surface") -> bytes:
@@ -68,6 +70,7 @@ def glb(moving: MovingMesh, name: str = "surface") -> bytes:
     moving = ascending(moving)
     buffer = Buffer()
     weights, targets, names, units = morph_targets(moving)
+    picture = gltf.TextureInfo(index=0) if moving.colors is None else None
     file = gltf.GLTF2(
         asset=gltf.Asset(version="2.0", generator=f"modeshape {version('modeshape')}"),
         scene=0,
@@ -77,7 +80,9 @@ def glb(moving: MovingMesh, name: str = "surface") -> bytes:
         materials=[
             gltf.Material(
                 pbrMetallicRoughness=gltf.PbrMetallicRoughness(
-                    baseColorTexture=gltf.TextureInfo(index=0), metallicFactor=0.0, roughnessFactor=1.0
+                    baseColorTexture=picture,
+                    metallicFactor=0.0,
+                    roughnessFactor=1.0,
                 ),
                 doubleSided=True,
                 alphaCutoff=None,
@@ -166,6 +171,7 @@ def textured_mesh(
     attributes = gltf.Attributes(
         POSITION=buffer.floats(moving.basis.rest.T, gltf.ARRAY_BUFFER, bounds=True),
         NORMAL=buffer.floats(normals(moving.basis.rest.T, moving.faces), gltf.ARRAY_BUFFER),
+        COLOR_0=None if moving.colors is None else buffer.floats(moving.colors, gltf.ARRAY_BUFFER),
         TEXCOORD_0=buffer.floats(moving.uv, gltf.ARRAY_BUFFER),
     )
     rest = moving.basis.rest.T

@@ -35,7 +35,7 @@ class Export(Json, Overwrite, Online):
       modeshape export recordings/demo.rrd --out demo.webm
     """
 
-    ESSENTIAL: ClassVar = ("recording", "format", "out", "axes")
+    ESSENTIAL: ClassVar = ("recording", "format", "out", "axes", "color")
 
     recording: tyro.conf.Positional[Path]
     """The recording (.rrd); one of a killed run will do."""
@@ -45,12 +45,18 @@ class Export(Json, Overwrite, Online):
     """File, or folder for obj, ply and csv; without it beside the recording and named after it."""
     axes: Literal["camera", "y-up"] = "camera"
     """Of obj and ply."""
+    color: Literal["picture", "strain", "curvature"] = "picture"
+    """Of glb: the first frame, or the greatest strain or curvature of each vertex, of either sign, in colours."""
 
     def __post_init__(self) -> None:
         ending = self.out.suffix.lower().lstrip(".") if self.out else ""
         single = ("glb", "npz", "mp4", "webm")
         if self.format is None and ending not in single:
             raise UsageError("no format: give --format glb, obj, ply, csv, npz, mp4 or webm")
+        if self.color != "picture" and self.kind != "glb":
+            raise UsageError(
+                f"--color {self.color} is of glb: the others have strain and curvature as numbers, or a picture"
+            )
         if self.format in single and self.out and ending != self.format:
             raise UsageError(f"--out {self.out} does not fit --format {self.format}: let it end in .{self.format}")
 

@@ -14,6 +14,7 @@ from app.pipeline.quality.verdict import Course
 from app.terminal.summary import Summary
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model
+from reconstruction.basis.surface import Surface
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import Score, followed, score
 from tracking.tracks import Truth
@@ -142,7 +143,8 @@ def save_shapes(
 ) -> None:
     """Write S (F, 3, P) camera axes; R, s, t, Lambda, faces, visible, frames, and the basis they refer to.
 
-    And sigma (F, P), the standard deviations of the vertices, if they were asked for. Lengths are in pixels of the first
+    And sigma (F, P), the standard deviations of the vertices, if they were asked for; strain and curvature (F, P), see
+    `reconstruction.basis.surface`. Lengths are in pixels of the first
     frame, or in another unit, of which a pixel has so many. Frames in which the surface was lost get rows of NaN.
 
     Raises:
@@ -170,6 +172,9 @@ def save_shapes(
     }
     if sigma is not None:
         arrays["sigma"] = unit * sigma
+    surface = Surface(arrays["rest"], model.mesh.faces)
+    arrays["strain"] = np.stack([surface.strain(shape) for shape in arrays["S"]])
+    arrays["curvature"] = np.stack([surface.curvature(shape) for shape in arrays["S"]])
     with writable(path) as file:
         np.savez_compressed(file, **arrays)
 

@@ -10,7 +10,9 @@ import numpy as np
 from app.arrays import Array, Indices
 from app.playback.playback import Playback
 from reconstruction.basis.modes import ROW_NAMES
+from reconstruction.basis.surface import Surface
 from reconstruction.camera import rotation_from_quaternion
+from reconstruction.estimate import ShapeEstimate
 
 
 def camera_path(playback: Playback, rows: Indices) -> tuple[Array, Array]:
@@ -35,7 +37,7 @@ def write_npz(playback: Playback, file: BinaryIO, advance: Callable[[], None]) -
     Lambda (F, 3, r), visible (F, P), frames (F,), faces (m, 3), rest (3, P), Upsilon (r, P), eigenvalues (r,), Phi (3, 3),
     K (3, 3), perspective. Besides: W (F, 2, P) observed px, NaN where not visible; projection (F, 2, P) px of the
     shapes; times_s (F,); quaternion (F, 4) of R, w first; camera_R, camera_position (see `camera_path`);
-    texture_px (P, 2) the points in the first frame; with --uncertainty sigma (F, P).
+    texture_px (P, 2) the points in the first frame; strain, curvature (F, P); with --uncertainty sigma (F, P).
     """
     rows = np.flatnonzero(playback.shaped | (np.array([phase.lower() for phase in playback.phases]) == "lost"))
     shapes = np.full((len(rows), *playback.basis.rest.shape), np.nan)
@@ -69,6 +71,9 @@ def write_npz(playback: Playback, file: BinaryIO, advance: Callable[[], None]) -
         "camera_position": camera_position,
         "texture_px": playback.texture_px,
     }
+    surface = Surface(basis.rest, playback.mesh.faces)
+    arrays["strain"] = np.stack([surface.strain(shape) for shape in shapes])
+    arrays["curvature"] = np.stack([surface.curvature(shape) for shape in shapes])
     if np.isfinite(sigma).any():
         arrays["sigma"] = sigma
     np.savez_compressed(file, **arrays)
@@ -78,10 +83,10 @@ def write_csv(playback: Playback, folder: Path, advance: Callable[[], None]) -> 
     """Four tables, every frame of the recording; what is not known is left empty.
 
     points.csv: frame, time_s, point, visible, observed_x/y px, projected_x/y px, x, y, z of the shape (camera axes,
-    pixels of the first frame), sigma (their standard deviation, with --uncertainty), one line for each point of each
-    frame. frames.csv: frame, time_s, phase, and the pose of the object: qw, qx, qy, qz, tx, ty px, s; camera_x/y/z and
-    camera_qw … qz: the camera in the axes of the rest shape. lambda.csv: frame, time_s, alpha_1 … tau_r px. mesh.csv:
-    the triangles' points a, b, c.
+    pixels of the first frame or millimetres), sigma (their standard deviation, with --uncertainty), strain and curvature,
+    one line for each point of each frame. frames.csv: frame, time_s, phase, and the pose of the object: qw, qx, qy, qz,
+    tx, ty px, s; camera_x/y/z and camera_qw … qz: the camera in the axes of the rest shape. lambda.csv: frame, time_s,
+    alpha_1 … tau_r. mesh.csv: the triangles' points a, b, c.
     """
     shaped = np.flatnonzero(playback.shaped)
     _, positions = camera_path(playback, shaped)
@@ -108,17 +113,22 @@ def write_csv(playback: Playback, folder: Path, advance: Callable[[], None]) -> 
     )
     table(folder / "mesh.csv", ["a", "b", "c"], playback.mesh.faces.tolist())
 
+    surface = Surface(playback.basis.rest, playback.mesh.faces)
+
+    def row_of(estimate: ShapeEstimate, i: int) -> Array:
+        place = [estimate.projection_px, estimate.shape.T, playback.estimates.sigma[i]]
+        return np.column_stack([*place, surface.strain(estimate.shape), surface.curvature(estimate.shape)])
+
     def point_rows() -> Iterable[list[object]]:
         for i in frames:
             estimate = playback.estimate(i)
-            unknown = np.full((playback.W.shape[2], 5), np.nan)
-            shape = unknown if estimate is None else np.column_stack([estimate.projection_px, estimate.shape.T])
-            values = np.column_stack([playback.W[i].T, shape, playback.estimates.sigma[i]])
+            unknown = np.full((playback.W.shape[2], 8), np.nan)
+            values = np.column_stack([playback.W[i].T, unknown if estimate is None else row_of(estimate, i)])
             for point, (visible, row) in enumerate(zip(playback.visible[i], values.tolist(), strict=True)):
                 yield [*times[i], point, int(visible), *cells(row)]
             advance()
 
-    columns = ["observed_x", "observed_y", "projected_x", "projected_y", "x", "y", "z", "sigma"]
+    columns = ["observed_x", "observed_y", "projected_x", "projected_y", "x", "y", "z", "sigma", "strain", "curvature"]
     table(folder / "points.csv", ["frame", "time_s", "point", "visible", *columns], point_rows())
 
 

@@ -57,6 +57,10 @@ def orthographic(moving: MovingMesh) -> MovingMesh:
     return replace(moving, scale=np.linspace(0.8, 1.3, FRAMES), field_of_view=None)
 
 
+def coloured(moving: MovingMesh) -> MovingMesh:
+    return replace(moving, colors=np.abs(moving.uv[:, [0, 1, 1]]).clip(0, 1))
+
+
 def bending(moving: MovingMesh) -> MovingMesh:
     return replace(moving, Lambda=moving.Lambda * np.array([0.0, 0.0, 1.0])[:, None])
 
@@ -86,7 +90,7 @@ def test_between_two_frames_pose_and_weights_are_interpolated(tmp_path, moving):
     assert relative(before, after) > 0.05
 
 
-@pytest.mark.parametrize("variant", [lambda moving: moving, orthographic, bending, rigid, still])
+@pytest.mark.parametrize("variant", [lambda moving: moving, orthographic, bending, rigid, still, coloured])
 def test_validator_finds_nothing(tmp_path, moving, variant):
     path = tmp_path / "moving.glb"
     path.write_bytes(glb(variant(moving)))
