@@ -25,9 +25,9 @@ FAIR_ERROR, POOR_ERROR = 0.010, 0.018
 POOR_GUESS = 0.005
 # What is not seen is a guess by its neighbours.
 FAIR_SHARE, POOR_SHARE = 0.5, 0.3
-# Lengths of a sheet that keeps them change by what noise makes of them, about as much as the median error; by twice that
-# where they really change (a balloon, a crease), and then no rest shape is right.
-FAIR_STRAIN = 1.75
+# Lengths of a sheet that keeps them change by what noise makes of them, about as much as the median error; by one and a
+# half times that and more where they really change (a balloon, a crease), and then no rest shape is right.
+FAIR_STRAIN = 1.5
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
@@ -166,7 +166,10 @@ def evidence(course: Course, found: Map, *, known: bool) -> Iterator[Verdict]:
     """What keyframes say; that there are none goes without saying where something worse is known."""
     if found.evidence is None:
         if found.rest.kind in RECOVERED and not known:
-            yield Verdict("fair", "it hardly turns or bends: depth is a guess; film it moving more, from near by")
+            yield Verdict(
+                "fair",
+                "only the first frames say what it is, depth may be a guess; film it turning or bending more, from near by",
+            )
         return
     usual = float(np.median(np.asarray(course.errors)))
     if found.sheet is not None and found.sheet.strain_rms > FAIR_STRAIN * usual:
