@@ -5,12 +5,15 @@ import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from time import monotonic, sleep
+from typing import TYPE_CHECKING
 from urllib.parse import quote, urlsplit
 
 import rerun_cli  # type: ignore[import-untyped]
 
-from app.options.run import Output
 from app.terminal.errors import UsageError
+
+if TYPE_CHECKING:
+    from app.options.run import Output  # the process that writes recordings needs no command line
 
 PORT, WEB_PORT = 9876, 9090
 TIMEOUT_S = 1.0
@@ -36,7 +39,7 @@ def running_viewer(address: str) -> str:
     return f"{parts.scheme}://{host}:{port}/proxy"
 
 
-def opened_viewer(path: Path | None, output: Output, log: Callable[[str], None]) -> str | None:
+def opened_viewer(path: Path | None, output: "Output", log: Callable[[str], None]) -> str | None:
     """The URL of the viewer that a run is to be watched in, which is started if it does not run; None without one.
 
     Args:
