@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 
-from tests.app.command_line import ENVIRONMENT, PROGRAM
+from tests.app.command_line import ENVIRONMENT, PROGRAM, turning
+from tests.app.mjpeg import Camera
 
 START_S = 30.0
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
@@ -144,6 +145,24 @@ def test_a_polygon_is_run(browser: Browser, videos: Path, tmp_path: Path) -> Non
         points = tracks["W"][0].T.astype(np.float32)
     corners = np.array([(60, 40), (270, 60), (250, 200), (90, 190)], np.float32)
     assert min(cv2.pointPolygonTest(corners, (float(x), float(y)), True) for x, y in points) >= -1.0
+
+
+def test_a_camera_s_picture_is_taken_after_a_countdown(browser: Browser, tmp_path: Path) -> None:
+    with Camera(list(turning(30))) as camera:
+        process, url = picking(tmp_path, camera.url)
+        browser.open(url)
+        browser.wait("picture.width && live")
+        first = browser.run("return canvas.toDataURL()")
+        browser.wait(f"canvas.toDataURL() !== '{first}'")  # it moves
+        assert browser.run("return document.getElementById('done').disabled")
+        browser.run("document.getElementById('freeze').click()")
+        browser.wait("document.getElementById('count').textContent === '1'")
+        browser.wait("!live")
+        browser.pointer(("down", 60, 50), ("up", 260, 190))
+        browser.run("document.getElementById('done').click()")
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert out.strip().endswith("/stream.mjpg --roi 60 50 200 140")
 
 
 def test_four_corners_of_a_later_frame_are_told(browser: Browser, videos: Path, tmp_path: Path) -> None:
