@@ -109,6 +109,7 @@ def as_rows(facts: Facts) -> dict[str, str]:
     """Facts as a person reads them, by label."""
     share, error, note = facts.visible_share, facts.reprojection_px, facts.rest_shape_note
     rows = {
+        "verdict": f"{facts.verdict}: {facts.verdict_reason}" if facts.verdict else "",
         "recording": str(facts.recording),
         "source": known(facts.source),
         "frames": f"{facts.frames} ({facts.first_frame} to {facts.last_frame}, {facts.duration_s:.2f} s), "

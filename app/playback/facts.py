@@ -36,6 +36,8 @@ class Facts(Summary):
     recording: Path
     version: str
     source: object
+    verdict: object
+    verdict_reason: object
     frames: int
     first_frame: int
     last_frame: int
@@ -79,6 +81,8 @@ def facts(playback: Playback, measured: Measures) -> Facts:
         recording=playback.path,
         version=playback.version,
         source=configuration.get("source"),
+        verdict=summary.get("verdict"),
+        verdict_reason=summary.get("verdict_reason"),
         frames=len(frames),
         first_frame=int(frames[0]),
         last_frame=int(frames[-1]),
