@@ -1,8 +1,10 @@
 """The on-line estimator: one observation in, the shapes it settles out (paper §5)."""
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+
+import numpy as np
 
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
@@ -13,7 +15,7 @@ from reconstruction.basis.rest_shape import RestShape, scaled_to
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.map import Map, ratio_of_sizes
-from reconstruction.mapping.mapper import Mapper
+from reconstruction.mapping.mapper import FEWEST_POINTS, Mapper
 from reconstruction.settings import Deformation, Metric, Settings
 from reconstruction.window import priors
 from reconstruction.window.energy import build_energy, build_guide
@@ -38,6 +40,11 @@ class Waiting:
     W: Array
     visible: Mask
     restart: bool
+
+    @property
+    def shows_enough(self) -> bool:
+        """Whether it shows points enough for a pose."""
+        return int(self.visible.sum()) >= FEWEST_POINTS
 
 
 class Reconstruction:
@@ -132,7 +139,7 @@ class Reconstruction:
         self._restart = False
         oldest = self._waiting[0]
         found = self._mapper.add(W, visible, self._assumed, (oldest.W, oldest.visible)) if self._mapper else None
-        if self._given is not None and self.map is None:
+        if self._given is not None and self.map is None and self._waiting[-1].shows_enough:
             found = Map(scaled_to(self._given, W, visible), self.camera)
         if found is not None:
             self.revisions += self.window is not None
@@ -173,7 +180,7 @@ class Reconstruction:
 
     def _advance(self, most: int) -> list[ShapeEstimate]:
         """The shapes of at most so many of the frames that wait, oldest first."""
-        if self.window is None:
+        if self.window is None or (self.window.state is None and not any(one.shows_enough for one in self._waiting)):
             return []
         return [self._shape_of(self._waiting.popleft()) for _ in range(min(most, len(self._waiting)))]
 
@@ -183,11 +190,16 @@ class Reconstruction:
         assert self.map is not None
         if frame.restart:
             self.window.restart()
+        seen = frame
+        if self.window.state is None and not frame.shows_enough:  # as in the first frame after it that does
+            seen = next(one for one in self._waiting if one.shows_enough)
         expected = None
         if self.deformation == "inextensible":
-            expected = self.map.expected(self.window.model, frame.W, frame.visible, self.window.state)
-        self._last = self.window.advance(frame.W, frame.visible, expected)
-        return self._last
+            expected = self.map.expected(self.window.model, seen.W, seen.visible, self.window.state)
+        self._last = self.window.advance(seen.W, seen.visible, expected)
+        if seen is frame:
+            return self._last
+        return replace(self._last, visible=frame.visible, residual_px=np.full_like(self._last.residual_px, np.nan))
 
     def _adopt(self, found: Map) -> None:
         """Go on with another model, as large as the one before, and from its last shape."""

@@ -2,7 +2,7 @@
 
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
@@ -10,6 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking import Array, Flags, Indices, TrackingError
+from tracking.extent import check_extent
+
+SKEW = 1e-3  # of the focal length: more is no ordinary camera
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,16 @@ class Tracks:
             if visible is None:
                 visible = np.ones((W.shape[0], W.shape[-1]) if W.ndim == 3 else (0, 0), bool)
             given = {name: _numbers(name, arrays) for name in ("K", "S_gt") if name in arrays}
-            return cls(W, visible, given.get("K"), given.get("S_gt"), _frame_numbers(arrays))
+            tracks = cls(W, visible, given.get("K"), given.get("S_gt"), _frame_numbers(arrays))
+            check_extent(tracks.W, tracks.visible)
+            return tracks
         except TrackingError as error:
             raise TrackingError(f"{path}: {error}") from None
+
+    def of_points(self, kept: Flags) -> Self:
+        """The same of some of the points (P,) alone."""
+        S_gt = None if self.S_gt is None else self.S_gt[:, :, kept]
+        return replace(self, W=self.W[:, :, kept], visible=self.visible[:, kept], S_gt=S_gt)
 
     def save(self, file: BinaryIO) -> None:
         """Write what `load` reads into a file that is open, as .npz."""
@@ -186,6 +196,8 @@ def _check_intrinsics(K: Array | None) -> None:
         raise _wrong_shape("K", K, "(3, 3)")
     if not (np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0):
         raise TrackingError("K is no camera matrix; its focal lengths K[0, 0] and K[1, 1] must be positive")
+    if abs(K[1, 0]) + abs(K[0, 1]) > SKEW * K[0, 0] or not np.allclose(K[2], (0, 0, 1)):
+        raise TrackingError("K is no camera matrix without skew; it must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
 
 
 def _check_truth(S: Array, frames: Indices, points: int) -> None:
@@ -193,6 +205,10 @@ def _check_truth(S: Array, frames: Indices, points: int) -> None:
         raise _wrong_shape("S_gt", S, f"(true frames, 3, {points}) as there are {points} points")
     if not np.isfinite(S).all():
         raise TrackingError("S_gt has entries that are not finite")
+    if (np.ptp(S, axis=2).max(axis=1) <= 0).any():
+        raise TrackingError(
+            f"S_gt has a shape without extent: that of frame {frames[np.ptp(S, axis=2).max(axis=1) <= 0][0]}"
+        )
     if frames.shape != (len(S),):
         raise _wrong_shape("gt_frames", frames, f"({len(S)},) as S_gt has {len(S)} shapes")
     if frames[0] < 0 or np.any(np.diff(frames) <= 0):

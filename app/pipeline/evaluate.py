@@ -29,6 +29,8 @@ from reconstruction.evaluation import score, with_missing, with_noise, with_outl
 from reconstruction.online import Reconstruction
 from tracking.tracks import Tracks
 
+FEWEST_FRAMES = 2  # that a point is seen in: one has no depth
+
 
 @dataclass(frozen=True, kw_only=True)
 class Evaluation(Summary):
@@ -85,6 +87,11 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
     visible = with_missing(tracks.visible, config.missing, rng)
     if config.outliers:
         W = with_outliers(W, tracks.visible, config.outliers, rng)
+    kept = visible.sum(axis=0) >= FEWEST_FRAMES
+    if config.rest_shape in RECOVERED and not kept.all():  # nobody knows where the others are
+        tracks = tracks.of_points(kept)
+        W, visible = W[:, :, kept], visible[:, kept]
+        progress.log(f"{int((~kept).sum())} of {points} points are seen in fewer than {FEWEST_FRAMES} frames: left out")
     reconstruction = prepare(config, tracks)
     collected = Collected(everything=True)
     with threadpool_limits(1), progress:
@@ -117,7 +124,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
         verdict=word.grade,
         verdict_reason=word.reason,
         frames=frames,
-        points=points,
+        points=int(kept.sum()) if config.rest_shape in RECOVERED else points,
         modes=len(reconstruction.model.basis.eigenvalues),
         rest_shape=rest.kind,
         rest_shape_note=rest.note,

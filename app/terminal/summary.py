@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
+from math import isfinite
 from pathlib import Path
 
 from rich.console import Console
@@ -33,7 +34,7 @@ class Summary:
 
     def as_json(self) -> str:
         """One JSON object."""
-        return json.dumps(self.as_dict(), indent=2)
+        return json.dumps(finite(self.as_dict()), indent=2, allow_nan=False)
 
     def print_table(self) -> None:
         """All of it as a table on stdout."""
@@ -52,6 +53,15 @@ class Summary:
     def exit_code(self) -> ExitCode:
         """How the command ended."""
         return ExitCode.DONE
+
+
+def finite(value: object) -> object:
+    """The same with None in place of numbers that JSON does not have."""
+    if isinstance(value, Mapping):
+        return {name: finite(one) for name, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(one) for one in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def print_rows(words: Mapping[str, object]) -> None:

@@ -18,6 +18,7 @@ from reconstruction.settings import Settings
 FIRST_LOOKS = (10, 15, 20, 30, 45, 60)  # frames after which a first model is looked for; the last decides
 LATENCY = 90  # frames after which a map that another process makes is in force: three seconds of most videos
 FEWEST = 10  # keyframes for a map
+FEWEST_POINTS = 4  # that a frame shows, for a first model
 GROWN = 1.3  # times as far apart as at the last map the keyframes are before there is another,
 RENEWED = 4 / 3  # or so many times as many frames have been keyframes
 
@@ -88,11 +89,13 @@ class Mapper:
             ReconstructionError: no rest shape can be had from the first frames.
         """
         self._frame += 1
-        self._begin = self._begin or begin
+        if self._begin is None and begin[1].sum() >= FEWEST_POINTS:
+            self._begin = begin
         if self._keyframes is not None:
             self._keyframes.offer(self._frame, W, visible)
         if self._first is not None:
-            self._first.append((W, visible))
+            if visible.sum() >= FEWEST_POINTS:
+                self._first.append((W, visible))
             self._look_first(self._first, camera)
         self._look_again(camera)
         if self._first is not None:

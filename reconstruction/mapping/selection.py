@@ -136,7 +136,7 @@ def decide(rigid: Rigid, sheet: Misfit) -> tuple[Kind, float]:
     Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges.
     """
     flat, solid = rigid.flat, rigid.solid
-    gain = flat.whole_px / (SOLID_FREEDOM * solid.whole_px)
+    gain = max(flat.whole_px, 1e-300) / max(SOLID_FREEDOM * solid.whole_px, 1e-300)
     best: Kind = "solid" if gain > 1 and rigid.relief > LEAST_RELIEF else "flat"
     rigid_px = solid.edges_px if best == "solid" else min(flat.edges_px, solid.edges_px)
     sheet_px = SHEET_FREEDOM * sheet.edges_px

@@ -10,6 +10,8 @@ from app.options.model import Model
 from app.pipeline.evaluate import Evaluation, evaluate
 from app.terminal.progress import Progress
 from reconstruction.basis.mesh import triangulate
+from tests.reconstruction.runs import swelling_hill
+from tracking import TrackingError
 
 MILLI, KILO = 1e-3, 1e3
 SLOW = pytest.mark.slow
@@ -95,3 +97,50 @@ def test_errors_are_as_large_as_predicted(shared_data: Path, file: str, rest: st
     assert score is not None
     assert score.error_over_sigma is not None
     assert 0.5 < score.error_over_sigma < 2
+
+
+def hostile(name: str, W: np.ndarray, visible: np.ndarray) -> dict[str, np.ndarray]:
+    """Tracks that cannot come of a surface, made of some that do."""
+    F, _, P = W.shape
+    unseen = np.zeros((F, P), bool)
+    return {
+        "never seen": {"W": W, "visible": unseen},
+        "at one place": {"W": np.zeros_like(W), "visible": visible},
+        "denormal": {"W": W / np.abs(W).max() * 1e-310, "visible": visible},
+        "too large": {"W": W / np.abs(W).max() * 1e300, "visible": visible},
+        "on a line": {"W": np.stack([W[:, 0], W[:, 0] / 2], axis=1), "visible": visible},
+        "mirrored camera": {"W": W, "visible": visible, "K": np.diag([500.0, 500.0, -1.0])},
+        "skewed camera": {"W": W, "visible": visible, "K": np.array([[500.0, 100, 0], [0, 500, 0], [0, 0, 1]])},
+    }[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("never seen", "no frame shows 4 points"),
+        ("at one place", "at one place"),
+        ("denormal", "at one place"),
+        ("too large", "values beyond"),
+        ("on a line", "on one line"),
+        ("mirrored camera", "no camera matrix"),
+        ("skewed camera", "without skew"),
+    ],
+)
+def test_tracks_that_show_nothing_are_refused(tmp_path: Path, name: str, says: str) -> None:
+    W, _ = swelling_hill()
+    np.savez(tmp_path / "tracks.npz", **hostile(name, W, np.ones((len(W), W.shape[2]), bool)))
+    with pytest.raises(TrackingError, match=says):
+        evaluate(Evaluate(tmp_path / "tracks.npz"), Progress())
+
+
+@pytest.mark.parametrize("unseen", [slice(5, 6), slice(0, 15)])
+def test_frames_that_show_nothing_do_not_stop_a_run(tmp_path: Path, unseen: slice) -> None:
+    W, _ = swelling_hill()
+    visible = np.ones((len(W), W.shape[2]), bool)
+    visible[unseen] = False
+    visible[:, 3] = False  # a point that is never seen is left out
+    np.savez(tmp_path / "tracks.npz", W=W, visible=visible)
+    words = evaluate(Evaluate(tmp_path / "tracks.npz", shapes_out=tmp_path / "shapes.npz"), Progress())
+    assert (words.frames, words.points) == (len(W), W.shape[2] - 1)
+    with np.load(tmp_path / "shapes.npz") as shapes:
+        assert np.isfinite(shapes["S"]).all()
