@@ -20,7 +20,7 @@ from app.recording.drawing import Shape, draw
 from app.recording.images import cropped, embedded_video, jpeg, texture
 from app.recording.modes import small_multiples
 from app.recording.stream import Stream
-from app.recording.styles import coefficient_styles, model_components, placement, styles, waiting_for
+from app.recording.styles import SEEN_RGB, coefficient_styles, model_components, placement, points, styles, waiting_for
 from app.recording.viewer import running_viewer
 from app.recording.wireframe import NO_STRIPS, Strips
 from app.terminal.errors import UsageError
@@ -109,11 +109,11 @@ class Recording:
                 nanoseconds = self._video_ns[[min(frame.index, len(self._video_ns) - 1)]]
                 self._stream.row(entities.IMAGE, rr.VideoFrameReference.columns_nanos, nanoseconds=nanoseconds)
 
-            points, visible = observation.points_px, observation.visible.copy()
-            if len(self._last_seen) != len(points):
-                self._last_seen = np.full_like(points, np.nan)
-            self._last_seen[visible] = points[visible]
-            self._stream.points(entities.SEEN, points[visible])
+            seen_px, visible = observation.points_px, observation.visible.copy()
+            if len(self._last_seen) != len(seen_px):
+                self._last_seen = np.full_like(seen_px, np.nan)
+            self._last_seen[visible] = seen_px[visible]
+            self._stream.points(entities.SEEN, seen_px[visible])
             without_shape = self._model is None or phase.lower() == "lost"
             lost = self._last_seen[~visible & np.isfinite(self._last_seen[:, 0])] if without_shape else NOWHERE
             self._stream.points(entities.LOST, lost)
@@ -203,9 +203,9 @@ class Recording:
 
     def truth(self, shapes: Mapping[int, Array]) -> None:
         """True points (n, 3) of some frames, where the shapes are."""
-        for index, points in shapes.items():
+        for index, true in shapes.items():
             with self._stream.frame(index, self._times[index]):
-                self._stream.row(entities.TRUTH, rr.Points3D.columns, positions=points.astype(np.float32))
+                self._stream.row(entities.TRUTH, rr.Points3D.columns, **points(true, SEEN_RGB, -1.5))
 
     def summary(self, values: Mapping[str, object]) -> None:
         """What came out of the run."""

@@ -61,8 +61,6 @@ def styles() -> Iterator[tuple[str, Loggable]]:
     for k, entity in enumerate(colors, start=1):
         # A negative radius is in points of the screen: the same size at every zoom.
         yield entity, rr.Points2D.from_fields(class_ids=k, radii=-2.0, draw_order=30 + k, show_labels=False)
-    yield entities.STATUS, rr.Points3D.from_fields(radii=0.0, show_labels=True, colors=(205, 210, 220))
-    yield entities.TRUTH, rr.Points3D.from_fields(radii=-1.5, colors=SEEN_RGB)
     yield entities.WIREFRAME, rr.LineStrips2D.from_fields(colors=[WIREFRAME_RGBA], radii=-0.5, draw_order=20)
     yield entities.REGION, rr.LineStrips2D.from_fields(colors=[PREDICTED_RGB], radii=-1.0, draw_order=25)
     # The viewer's pixels are squares between whole numbers; ours, like OpenCV's, have their centres there.
@@ -127,4 +125,12 @@ def model_components(
 
 def waiting_for(frames: int) -> dict[str, Values]:
     """What is said in place of a mesh while the first frames are watched: a row of Points3D."""
-    return {"positions": np.zeros((1, 3), np.float32), "labels": [f"watching the first frames: {frames}"]}
+    text = [f"watching the first frames: {frames}"]
+    return points(np.zeros((1, 3)), (205, 210, 220), 0.0) | {"labels": text, "show_labels": np.array([True])}
+
+
+def points(positions: Array, rgb: tuple[int, int, int], radius: float) -> dict[str, Values]:
+    """A row of Points3D; said once, their style would be an error where there are none."""
+    red, green, blue = rgb
+    color = np.array([red << 24 | green << 16 | blue << 8 | 255], np.uint32)
+    return {"positions": positions.astype(np.float32), "colors": color, "radii": np.array([radius], np.float32)}
