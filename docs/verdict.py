@@ -27,7 +27,7 @@ from app.synthetic.tracks import SEVERE, USUAL, Damage, tracks
 from reconstruction import ReconstructionError
 
 PAGE = Path(__file__).with_suffix(".md")
-SEEDS = (1, HELD_SEEDS + 1)  # thresholds were chosen on those under HELD_SEEDS alone
+SEEDS = (1, HELD_SEEDS + 1)  # thresholds were chosen on those under HELD_SEEDS
 DAMAGED = ("waving-5", "waving-9", "rolling", "box", "head", "balloon")
 SHARED = ("waving_3", "waving_5", "waving_7", "waving_9", "flag250", "flag250_perspective", "face37")
 PAPER_RANGES = ("0:113", "40:113", "80:113", "136:191", ":")
@@ -108,7 +108,8 @@ def page(cases: list[Case]) -> str:
             "residuals over the picture's size and their course, points seen, and what keyframes say of the model. "
             "Written by `python -m docs.verdict`.\n",
             markdown_table(columns, [row(grade, scores) for grade in reversed(GRADES)]),
-            f"The same for what nobody chose thresholds on (seeds from {HELD_SEEDS} on, and `kinect_paper` from 136 on):\n",
+            f"The same for seeds from {HELD_SEEDS} on and `kinect_paper` from 136 on, which thresholds were not chosen on, but for "
+            "one: that on lengths went from 1.75 to 1.5 after a look at all of them.\n",
             markdown_table(columns, [row(grade, held_back) for grade in reversed(GRADES)]),
             "All of them, best first:\n",
             markdown_table(("case", "e3d %", "verdict", "reason"), sorted(every, key=lambda one: one[1])),
