@@ -181,7 +181,8 @@ class RecordingProcess:
             for call in calls:
                 self._connection.send_bytes(pickle.dumps(call, protocol=5))
                 while self._connection.poll():
-                    self._receive()
+                    if not self._receive():  # it was the last call, and is done already
+                        return
             while self._receive():
                 pass
         except Exception as error:

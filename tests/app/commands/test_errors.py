@@ -142,7 +142,7 @@ def files(here: Path) -> Path:
     W = 50 * rng.normal(size=(12, 2, POINTS)) + 200
     hole, blind = W.copy(), np.ones((12, POINTS), bool)
     hole[3, 0, 4] = np.nan
-    blind[5] = False
+    blind[:] = False
     np.savez(here / "tracks.npz", W=W)
     np.savez(here / "keys.npz", X=W)
     np.savez(here / "flat.npz", W=W[:, :1])
@@ -151,7 +151,7 @@ def files(here: Path) -> Path:
     np.savez(here / "visible.npz", W=W, visible=np.ones((12, POINTS - 1), bool))
     np.savez(here / "nan.npz", W=hole)
     np.savez(here / "truth.npz", W=W, S_gt=np.zeros((2, 3, POINTS - 1)), gt_frames=[0, 1])
-    np.savez(here / "late.npz", W=W, S_gt=np.zeros((2, 3, POINTS)), gt_frames=[0, 50])
+    np.savez(here / "late.npz", W=W, S_gt=rng.normal(size=(2, 3, POINTS)), gt_frames=[0, 50])
     np.savez(here / "camera.npz", W=W, K=np.zeros((3, 3)))
     np.savez(here / "blind.npz", W=W, visible=blind)
     np.savez(here / "still.npz", W=np.broadcast_to(W[:1], W.shape))
