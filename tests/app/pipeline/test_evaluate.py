@@ -52,7 +52,8 @@ def write_mesh(path: Path, shape: np.ndarray[tuple[int, ...], np.dtype[np.float6
         pytest.param("face37", "rigid", UNITS, marks=SLOW),
         pytest.param("face37", "auto", ((KILO, MILLI),), marks=SLOW),
         pytest.param("flag250", "auto", ((KILO, MILLI),), marks=SLOW),
-        pytest.param("flag250_perspective", "auto", ((KILO, MILLI),), marks=SLOW),
+        # A regular grid has ties, which rounding decides (2e-6 in the error): powers of two have none.
+        pytest.param("flag250_perspective", "auto", ((1.0, 2.0**-10), (1.0, 2.0**10)), marks=SLOW),
         # Facing an orthographic camera a sheet is on a saddle, where rounding decides: powers of two have none.
         pytest.param("flag250", "plane", ((1.0, 2.0**-10), (1.0, 2.0**10)), marks=SLOW),
     ],
