@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.files.names import beside
 from app.files.writing import write_json
 from app.terminal.exit_code import ExitCode
 
@@ -99,8 +100,7 @@ def own_outputs(options: Sequence[str], name: str) -> list[str]:
     own = list(options)
     for i in range(1, len(own)):
         if own[i - 1] in OUTPUTS:
-            path = Path(own[i])
-            own[i] = str(path.with_name(f"{path.stem}-{name}{path.suffix}"))
+            own[i] = str(beside(Path(own[i]), name, overwrite=True))
     return own
 
 

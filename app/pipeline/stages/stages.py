@@ -39,9 +39,10 @@ class Stages:
         """What writes recordings; a context manager that completes them."""
         if not isinstance(self.tracking, TrackingProcess):
             return RecordingHere(needed=needed)
-        if not needed or self._launched.recording is None:
+        begun = self._launched.recording if needed else None
+        if begun is None:
             self.tracking.ring.release_all()
-        return RecordingProcess(self._launched.recording if needed else None, self.tracking.ring)
+        return RecordingProcess(begun, self.tracking.ring)
 
     def __enter__(self) -> Self:
         with self._ends:  # what has begun ends if another cannot begin

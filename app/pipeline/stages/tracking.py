@@ -106,14 +106,13 @@ class TrackingStage:
 
     Args:
         config: source, region and number of points.
-        keep: takes each picture, with the frame's number, before anybody is told of it.
 
     Raises:
         TrackingError: the source cannot be read.
     """
 
-    def __init__(self, config: Run, keep: Callable[[int, Image], None]) -> None:
-        self._config, self._keep = config, keep
+    def __init__(self, config: Run) -> None:
+        self._config = config
         self._told: list[str] = []
         self.video = Video(
             config.source,
@@ -131,8 +130,8 @@ class TrackingStage:
         """What is known before the first frame."""
         return Opened(self.video.size, self.video.fps, self.video.frame_count)
 
-    def next(self, asked: Asked) -> Seen | None:
-        """The next frame; None at the end of the source.
+    def next(self, asked: Asked, keep: Callable[[int, Image], None]) -> Seen | None:
+        """The next frame; None at the end of the source. `keep` takes its number and picture before it is looked at.
 
         Raises:
             UsageError, TrackingError: the source breaks off, or a region, mask or mesh does not fit the picture.
@@ -145,7 +144,7 @@ class TrackingStage:
         frame = next(self._frames, None)
         if frame is None:
             return None
-        self._keep(self._number, frame.image)
+        keep(self._number, frame.image)
         decoded, read_s = perf_counter(), self.video.arrived_s(frame)
         self._trackers = {one: tracker for one, tracker in self._trackers.items() if one in asked.expected_px}
         objects = {one: self._object(one, frame, expected_px) for one, expected_px in asked.expected_px.items()}

@@ -5,11 +5,10 @@ from types import TracebackType
 from typing import Protocol, Self
 
 import cv2
-import numpy as np
 
 from app.arrays import Image
 from app.options.run import Run
-from app.pipeline.stages.tracking import Asked, Opened, Seen, TrackingStage
+from app.pipeline.stages.tracking import LAG, Asked, Opened, Seen, TrackingStage
 from app.processes.child import connection_to_parent, inherited_file
 from app.processes.remote import Remote, serve
 from app.processes.ring import Ring
@@ -27,7 +26,7 @@ class Tracking(Protocol):
         """What the oldest frame asked for shows; None at the end of the source."""
 
     def picture(self, number: int, *, keep: bool) -> Image:
-        """The picture of the frame received last; one not to keep changes later."""
+        """The picture of one of the last frames received, by its number; one not to keep changes later."""
 
 
 class TrackingHere:
@@ -38,8 +37,8 @@ class TrackingHere:
     """
 
     def __init__(self, config: Run) -> None:
-        self._picture: Image = np.empty((0, 0, 3), np.uint8)
-        self._stage = TrackingStage(config, self._kept)
+        self._pictures: dict[int, Image] = {}
+        self._stage = TrackingStage(config)
         self._waiting: deque[Asked] = deque()
         self.opened = self._stage.opened
 
@@ -49,14 +48,15 @@ class TrackingHere:
 
     def receive(self) -> Seen | None:
         """Find it out."""
-        return self._stage.next(self._waiting.popleft())
+        return self._stage.next(self._waiting.popleft(), self._keep)
 
     def picture(self, number: int, *, keep: bool) -> Image:  # noqa: ARG002
         """The frame's own."""
-        return self._picture
+        return self._pictures[number]
 
-    def _kept(self, number: int, picture: Image) -> None:  # noqa: ARG002
-        self._picture = picture
+    def _keep(self, number: int, picture: Image) -> None:
+        self._pictures.pop(number - LAG, None)
+        self._pictures[number] = picture
 
     def __enter__(self) -> Self:
         return self
@@ -105,17 +105,16 @@ def main() -> None:
     """What the process does: it opens the source, then it answers what is asked, until nobody listens any more."""
     cv2.setNumThreads(1)
     connection, pictures = connection_to_parent(), inherited_file(2)
-    stage: TrackingStage | None = None
+    stage: TrackingStage
+    ring: Ring
 
     def answer(message: Run | Asked) -> Opened | Seen | None:
-        nonlocal stage
-        if isinstance(message, Run):
-            ring: list[Ring] = []
-            stage = TrackingStage(message, lambda number, image: ring[0].write(number, image))
-            ring.append(Ring(pictures, stage.video.size))
-            return stage.opened
-        assert stage is not None
-        return stage.next(message)
+        nonlocal stage, ring
+        if isinstance(message, Asked):
+            return stage.next(message, ring.write)
+        stage = TrackingStage(message)
+        ring = Ring(pictures, stage.video.size)
+        return stage.opened
 
     serve(connection, answer)
 

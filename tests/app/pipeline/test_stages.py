@@ -57,14 +57,17 @@ def in_folder(here: Path) -> None:
 
 
 def test_in_one_process_shapes_are_the_same(videos: Path) -> None:
-    known = []
+    known, pictures = [], []
     for jobs in (1, 2):
         written = Output(out=Path(f"run{jobs}.rrd"), shapes_out=Path(f"shapes{jobs}.npz"))
         Session(replace(config(videos), jobs=jobs, output=written), Progress()).run()
         with np.load(f"shapes{jobs}.npz") as shapes:
             known.append(shapes["S"])
-        assert sum(image is not None for _, image in Playback.load(Path(f"run{jobs}.rrd")).images()) == len(known[-1])
+        pictures.append([image for _, image in Playback.load(Path(f"run{jobs}.rrd")).images()])
+        assert sum(image is not None for image in pictures[-1]) == len(known[-1])
     np.testing.assert_allclose(known[0], known[1], rtol=1e-9)
+    for here, apart in zip(*pictures, strict=True):
+        np.testing.assert_array_equal(here, apart)
 
 
 @pytest.mark.parametrize(
