@@ -14,9 +14,9 @@ from app.files.video_out import check_video_format, usual_fps
 from app.files.writing import check_outputs
 from app.options.retexture import Retexture
 from app.options.run import parse_range
-from app.painting.compositing import Placement
 from app.painting.painter import Painter
 from app.painting.picture import Texture
+from app.painting.placement import Placement, corners_of, in_first_frame, outline_of
 from app.pipeline.session import Session
 from app.pipeline.summary import RunSummary
 from app.playback.playback import Playback
@@ -78,7 +78,9 @@ def retexture(command: Retexture, progress: Progress) -> Painted:
     check_video_format(command.out)
     inputs = (command.source, command.texture, command.mask)
     check_outputs({"--out": command.out, "--rrd": command.rrd}, inputs, overwrite=command.overwrite)
-    placement = Placement(command.place, command.opacity)
+    placement = Placement(corners_of(command.place), command.opacity, outline_of(command.outline))
+    if command.place_frame is not None and (command.place is None or command.run.live):
+        raise UsageError("--place-frame goes with --place, of a recording or a video file")
     with Texture(command.texture) as texture, Painter(command.out, texture, placement) as painter:
         way = play if is_recording(command.source) else follow if command.run.live else reconstruct
         on = way(command, painter, progress)
@@ -103,6 +105,7 @@ def reconstruct(command: Retexture, painter: Painter, progress: Progress) -> Run
             for playback in (Playback.load(path) for path in session.recordings):
                 for i, frame in zip(range(len(playback.frames)), frames, strict=False):
                     if i == 0 and playback.recorded_model is not None:
+                        painter.placement = placed(command, playback, painter.placement)
                         painter.begin(frame, playback.texture_px, playback.model, video.fps)
                     estimate = playback.estimate(i) if playback.recorded_model is not None else None
                     painter.frame(frame, Observation(playback.W[i].T, playback.visible[i]), estimate)
@@ -149,6 +152,9 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Played:
     if not wanted.any():
         numbers = f"{playback.frames[0]} to {playback.frames[-1]}"
         raise UsageError(f"{playback.path} has no frame in {command.frames}: it contains the frames {numbers}")
+    outline = playback.configuration.get("corners") or playback.configuration.get("polygon")
+    known = replace(painter.placement, outline=outline_of(cast("list[float] | None", outline)))
+    painter.placement = placed(command, playback, known)
     begun = interrupted = False
     with progress:
         progress.expect(int(wanted.sum()))
@@ -175,21 +181,42 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Played:
     return Played(command.source, len(playback.frames), interrupted)
 
 
+def placed(command: Retexture, playback: Playback, placement: Placement) -> Placement:
+    """Where the picture lies in the first frame, if it has been told in another.
+
+    Raises:
+        UsageError: that frame is not there, or without a shape.
+    """
+    number = command.place_frame
+    if number is None or placement.corners is None:
+        return placement
+    i = int(np.searchsorted(playback.frames, number))
+    estimate = playback.estimate(i) if i < len(playback.frames) and playback.frames[i] == number else None
+    if estimate is None:
+        raise UsageError(f"--place-frame {number}: there is no shape in that frame; choose another one")
+    at = (estimate.projection_px, estimate.shape[2], playback.W[i].T)
+    perspective = playback.camera.perspective
+    return in_first_frame(placement, at, playback.texture_px, playback.mesh, playback.size, perspective=perspective)
+
+
 def first_frame(playback: Playback, i: int, image: Image) -> Image:
     """The frame (H, W, 3) in which the vertices are at `texture_px`, right where the surface is.
 
-    It need not be in the recording, which may be a later part of a long one; the mesh's texture is a crop of it. Where
-    `run --texture` has painted that, it has to be the recording's first `image`, of row i.
+    The mesh's texture is a crop of it. The rest is in the recording's first `image`, of row i, or nowhere if the
+    recording is a later part of a long one. Where `run --texture` has painted the crop, that image is all of it.
 
     Raises:
         UsageError: the surface is elsewhere in that image.
     """
+    moved = np.linalg.norm(playback.W[i].T - playback.texture_px, axis=1)[playback.visible[i]]
+    still = len(moved) > 0 and np.median(moved) <= STILL_PX
     if playback.configuration.get("texture") is None:
         (width, height), (x, y), (h, w) = playback.size, playback.texture_origin.tolist(), playback.texture_bgr.shape[:2]
         border = (y, height - y - h, x, width - x - w)
-        return cast(Image, cv2.copyMakeBorder(playback.texture_bgr, *border, cv2.BORDER_REPLICATE))
-    moved = np.linalg.norm(playback.W[i].T - playback.texture_px, axis=1)[playback.visible[i]]
-    if not len(moved) or np.median(moved) > STILL_PX:
+        around = image.copy() if still else cv2.copyMakeBorder(playback.texture_bgr, *border, cv2.BORDER_REPLICATE)
+        around[y : y + h, x : x + w] = playback.texture_bgr
+        return cast(Image, around)
+    if not still:
         raise UsageError(f"{playback.path} begins later than its run: give the first part of the recording")
     return image
 

@@ -16,15 +16,30 @@ class Retexture(Json, Overwrite, Source):
 
     A file is painted once all of it has been reconstructed. The picture lies in the scene's light, and behind what is in
     front of the surface; after a cut to another scene, frames stay as they are. The options of `run` are only for videos,
-    but for --frames, --place and --opacity.
+    but for --frames, --place and --opacity. Of a sheet whose --corners are told, it reaches to the edge.
 
     Examples:
       modeshape retexture recordings/demo.rrd --texture poster.png --out poster.mp4
       modeshape retexture paper.mp4 --roi 195 95 325 265 --texture logo.png --place 250 160 90 60 --out logo.webm
+      modeshape retexture paper.mp4 --corners 172 77 573 107 568 398 143 365 --texture poster.png --out poster.mp4
     """
 
     ESSENTIAL: ClassVar = (
-        *("source", "texture", "out", "place", "opacity", "roi", "corners", "mask", "frames", "focal", "rrd", "view"),
+        *(
+            "source",
+            "texture",
+            "out",
+            "place",
+            "place_frame",
+            "opacity",
+            "roi",
+            "corners",
+            "mask",
+            "frames",
+            "focal",
+            "rrd",
+            "view",
+        ),
         *("json", "overwrite"),
     )
 
@@ -36,6 +51,8 @@ class Retexture(Json, Overwrite, Source):
     """The new video: .mp4 (H.264) or .webm (VP9)."""
     rrd: Path | None = None
     """Also keep a recording; only for videos."""
+    place_frame: int | None = None
+    """The frame that --place is told in, by its number in the source; without it the first."""
     view: bool = False
     """Open the viewer and watch live; only for videos."""
 

@@ -80,8 +80,9 @@ class Source:
     """Where the rest shape comes from: the first frames (a turning object: rigid; a flat sheet: plane), or a mesh file."""
     camera: Literal["perspective", "orthographic"] = "perspective"
     """How the picture came about."""
-    place: tuple[int, int, int, int] | None = None
-    """Where --texture lies in the first frame: X Y WIDTH HEIGHT in pixels; without it over the whole mesh."""
+    place: tuple[float, ...] | None = None
+    """Where --texture lies in the first frame: X Y WIDTH HEIGHT in pixels, or X1 Y1 … X4 Y4, its top left, top right,
+    bottom right and bottom left; without it over the whole surface, along its sides."""
     opacity: float = 1.0
     """Of --texture, 0 to 1."""
     size_mm: float | None = None
@@ -114,9 +115,11 @@ class Source:
             raise UsageError("--size-mm needs a camera in perspective: leave --camera orthographic out")
         if self.between is not None and (self.size_mm is None or self.between[:2] == self.between[2:]):
             raise UsageError("--between goes with --size-mm, the length between two different places: --size-mm 297")
-        if self.place is not None and min(self.place[2:]) < 1:
-            area = " ".join(map(str, self.place))
-            raise UsageError(f"--place {area} has no area: give X Y WIDTH HEIGHT, both sizes 1 and more")
+        if self.place is not None and not placeable(self.place):
+            told = " ".join(f"{number:g}" for number in self.place)
+            raise UsageError(
+                f"--place {told} has no area: give X Y WIDTH HEIGHT, both sizes 1 and more, or four corners, going round"
+            )
         if not 0 <= self.opacity <= 1:
             raise UsageError(f"--opacity {self.opacity} is no opacity: give 0 to 1")
 
@@ -186,6 +189,11 @@ class Demo(Json):
 
     view: bool = False
     """Open the viewer and watch live."""
+
+
+def placeable(place: tuple[float, ...]) -> bool:
+    """Whether numbers are x, y, width and height, or four corners of a figure with an area."""
+    return min(place[2:]) >= 1 if len(place) == 4 else len(place) == 8 and convex(place)
 
 
 def convex(corners: tuple[float, ...]) -> bool:

@@ -1,33 +1,25 @@
 """Compositing: a picture on the moving surface in the video, with the surface's shading, behind what occludes it."""
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import cast
 
 import cv2
 import numpy as np
-from scipy.sparse import csr_array
 
-from app.arrays import Array, Flags, Floats, Image, Mask
+from app.arrays import Array, Floats, Image, Mask
 from app.painting import shading
 from app.painting.occlusion import occlusion_mask
-from app.painting.picture import Box, Pyramid
+from app.painting.picture import Pyramid
+from app.painting.placement import Placement, extent
 from app.painting.raster import Rasteriser, SurfaceMap
+from app.painting.surface import Surface
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model
 
-ROUNDS = 20  # of diffusing the points' offsets from the shape over their neighbours
-OUTLIER_PX = 1.5  # a point whose offset differs from its neighbours' by this counts half
 PAPER = 0.95  # of a picture's full white is what bare paper shows
+EDGE_PX = 0.7  # of the surface where its outline is not straight
 FEATHER_PX = 0.6  # half-resolution px, of the mask
-
-
-@dataclass(frozen=True)
-class Placement:
-    """Where a picture lies in the first frame: x, y, width, height px (None: over the whole mesh); and its opacity."""
-
-    place: Box | None = None
-    opacity: float = 1.0
 
 
 class Compositor:
@@ -52,24 +44,25 @@ class Compositor:
         first = even(first)
         h, w = first.shape[:2]
         self._opacity = placement.opacity
-        self._place = placement.place or bounding_box(reference_px)
+        self._perspective = perspective
         self._reference_px = reference_px
-        self._raster = Rasteriser(mesh.faces, reference_px, (w, h), perspective=perspective)
+        reach = extent(placement.outline, reference_px, mesh.faces, (w, h))
+        self._corners = reach.quad if placement.corners is None else placement.corners
+        self._surface = Surface(reference_px, mesh, reach.quad, reach.region)
+        net = self._surface.net
+        self._region = None if reach.region is None else cast(Mask, cv2.GaussianBlur(reach.region, (0, 0), EDGE_PX))
+        self._raster = Rasteriser(net.faces, net.nodes_px, (w, h), perspective=perspective)
         self._reference = shading.Reference(first)
         self._shade = np.ones((h // 2, w // 2), np.float32)
         self._mask = np.zeros((h // 2, w // 2), np.uint8)
-        self._averages = neighbour_averages(mesh, len(reference_px))
-        first_map = self._raster.map(reference_px, np.ones(len(reference_px)))
+        first_map = self._mapped(net.nodes_px, np.ones(len(net.nodes_px)))
         covered = np.zeros((h, w), np.uint8)
         if first_map is not None:
             covered[first_map.region] = first_map.cover == 1
-        x, y, wide, tall = self._place
-        if not covered[max(y, 0) : max(y + tall, 0), max(x, 0) : max(x + wide, 0)].any():
-            across, down = np.column_stack([reference_px.min(axis=0), reference_px.max(axis=0)]).round().astype(int)
-            raise UsageError(
-                f"--place {x} {y} {wide} {tall} is not on the surface, which is between {across[0]} and {across[1]} across "
-                f"and {down[0]} and {down[1]} down in the first frame"
-            )
+        wanted = np.zeros((h, w), np.uint8)
+        cv2.fillConvexPoly(wanted, np.rint(self._corners).astype(np.int32), 1)
+        if not (covered & wanted).any():
+            raise UsageError(f"--place is not on the surface, which is {told(reach.quad)} in the first frame")
         self._first_map, self._first = first_map, first
         self._white = shading.white_level(first, covered)
         self._pyramid: tuple[Image, Pyramid] | None = None
@@ -84,9 +77,9 @@ class Compositor:
             depth: (p,) their depths.
             observed_px: (p, 2) where they are seen, NaN where they are not.
         """
-        visible = np.isfinite(observed_px[:, 0])
-        points = self.corrected(projection_px, observed_px, visible)
-        surface = self._raster.map(points, depth)
+        points = self._surface.corrected(projection_px, observed_px)
+        nodes, depths = self._surface.nodes(projection_px, depth, points, perspective=self._perspective)
+        surface = self._mapped(nodes, depths)
         if surface is None:
             return image
         frame = even(image)
@@ -98,7 +91,9 @@ class Compositor:
         view = shading.View(view.seen, view.predicted * gains, view.variance, view.inside)
         last = self._shade[half]
         corner = (surface.left, surface.top)
-        mask, agreement = occlusion_mask(view, last, self._mask[half], (points - corner - 0.5) / 2, visible)
+        mask, agreement = occlusion_mask(
+            view, last, self._mask[half], (points - corner - 0.5) / 2, np.isfinite(observed_px[:, 0])
+        )
         shade = shading.shading(view, view.inside * (1 - mask) * agreement, last)
         self._mask[:], self._shade[half] = 0, shade
         self._mask[half] = mask
@@ -113,20 +108,19 @@ class Compositor:
         lit = np.ones((h // 2, w // 2, 3), np.float32)
         return self._blended(image, self._first_map, picture, lit, np.zeros((h // 2, w // 2), np.uint8))
 
-    def corrected(self, projection_px: Array, observed_px: Array, visible: Flags) -> Array:
-        """The vertices (p, 2) where they are seen; others are moved off the shape as their neighbours are."""
-        seen = np.where(visible, (observed_px - projection_px) @ np.array((1, 1j)), 0.0)
-        off = seen
-        for _ in range(ROUNDS):
-            around = self._averages @ off
-            off = around + visible / (1.0 + (np.abs(seen - around) / OUTLIER_PX) ** 2) * (seen - around)
-        return np.asarray(projection_px + np.column_stack([off.real, off.imag]))
+    def _mapped(self, nodes_px: Array, depth: Array) -> SurfaceMap | None:
+        """Where the surface is seen, with the net's nodes (q, 2) there, at depths (q,)."""
+        surface = self._raster.map(nodes_px, depth)
+        if surface is None or self._region is None:
+            return surface
+        share = shading.sampled(self._region, surface.uv, cv2.BORDER_CONSTANT).astype(np.float32)
+        return replace(surface, cover=surface.cover * (share * np.float32(1 / 255)))
 
     def _blended(self, image: Image, surface: SurfaceMap, picture: Image, light: Floats, mask: Mask) -> Image:
         """The frame with the picture at the map's places, times the light (h / 2, w / 2, 3), not where the mask is set."""
         h, w = surface.cover.shape
         if self._pyramid is None or self._pyramid[0] is not picture:
-            self._pyramid = (picture, Pyramid(picture, self._place))
+            self._pyramid = (picture, Pyramid(picture, self._corners))
         layer = self._pyramid[1].sampled(surface.uv, surface.cover)
         uv = shading.halved(surface.uv)
         white = shading.quadratic(uv[..., 0], uv[..., 1], self._first.shape) @ self._white / PAPER
@@ -162,15 +156,6 @@ def even(image: Image) -> Image:
     return cast(Image, cv2.copyMakeBorder(image, 0, h % 2, 0, w % 2, cv2.BORDER_REPLICATE))
 
 
-def bounding_box(points_px: Array) -> Box:
-    """x, y, width, height of the pixels around points (p, 2)."""
-    low, high = np.floor(points_px.min(axis=0)).astype(int), np.ceil(points_px.max(axis=0)).astype(int)
-    return int(low[0]), int(low[1]), int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
-
-
-def neighbour_averages(mesh: Mesh, vertices: int) -> csr_array:
-    """A matrix (p, p) that replaces each vertex's value by the mean of its neighbours'."""
-    a, b = mesh.edges.T
-    degree = np.maximum(np.bincount(mesh.edges.ravel(), minlength=vertices), 1).astype(float)
-    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
-    return csr_array((1.0 / degree[rows], (rows, columns)), shape=(vertices, vertices))
+def told(corners: Array) -> str:
+    """Corners (n, 2) in words."""
+    return ", ".join(f"{x:.0f} {y:.0f}" for x, y in corners)

@@ -8,8 +8,9 @@ from typing import Self
 
 from app.arrays import Array
 from app.files.video_out import VideoSink, writable_video
-from app.painting.compositing import Compositor, Placement
+from app.painting.compositing import Compositor
 from app.painting.picture import Texture
+from app.painting.placement import Placement
 from reconstruction.basis.model import Model
 from reconstruction.estimate import ShapeEstimate
 from tracking.klt import Observation
@@ -25,11 +26,12 @@ class Painter:
         placement: where it lies.
 
     Attributes:
+        placement: may be changed until the first frame.
         painted: number of frames painted.
     """
 
     def __init__(self, out: Path, texture: Texture, placement: Placement) -> None:
-        self._out, self._texture, self._placement = out, texture, placement
+        self._out, self._texture, self.placement = out, texture, placement
         self._files = ExitStack()
         self._video: VideoSink | None = None
         self._compositor: Compositor | None = None
@@ -54,9 +56,7 @@ class Painter:
             self._compositor = None
             return
         perspective = model.camera.perspective
-        self._compositor = Compositor(
-            first.image, points_px, model.mesh, perspective=perspective, placement=self._placement
-        )
+        self._compositor = Compositor(first.image, points_px, model.mesh, perspective=perspective, placement=self.placement)
         height, width = first.image.shape[:2]
         self._video = self._files.enter_context(writable_video(self._out, (width, height), fps))
         self._begun_s = first.time_s

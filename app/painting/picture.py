@@ -7,18 +7,18 @@ from typing import Self, cast
 import cv2
 import numpy as np
 
-from app.arrays import Floats, Image
+from app.arrays import Array, Floats, Image
 from app.painting.shading import sampled
+from app.painting.surface import homography
 from app.terminal.errors import UsageError
 from tracking import TrackingError
 from tracking.video import Frame, Video
-
-Box = tuple[int, int, int, int]
 
 STILLS = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".webp", ".tif", ".tiff"))
 FINEST = 2.0  # texels kept per pixel of the first frame: enough for a surface at half the distance
 SHARPEN = 0.3  # levels by which minification may exceed that of the level sampled
 SPREAD = 0.35  # new pixels, of the blur before shrinking
+OPPOSITE = (((0, 1), (3, 2)), ((0, 3), (1, 2)))  # corners at the ends of a picture's upper and lower, left and right side
 STEP_PX = 4  # between the pixels whose minification is looked at
 
 
@@ -96,13 +96,14 @@ class Pyramid:
 
     Args:
         picture: (h, w, 4) premultiplied.
-        place: x, y, width, height in px of the first frame.
+        corners: (4, 2) px of the first frame: its top left, top right, bottom right and bottom left.
     """
 
-    def __init__(self, picture: Image, place: Box) -> None:
-        self._place = place
+    def __init__(self, picture: Image, corners: Array) -> None:
+        self._corners = corners
         h, w = picture.shape[:2]
-        most = (max(1, round(FINEST * place[2])), max(1, round(FINEST * place[3])))
+        wide, tall = (max(np.linalg.norm(corners[a] - corners[b]) for a, b in ends) for ends in OPPOSITE)
+        most = (max(1, round(FINEST * wide)), max(1, round(FINEST * tall)))
         if w > most[0] or h > most[1]:
             picture = shrunk(picture, (min(w, most[0]), min(h, most[1])))
         self._levels = [picture]
@@ -124,17 +125,18 @@ class Pyramid:
 
     def _at_level(self, level: int, uv: Floats) -> Image:
         picture = self._levels[level]
-        h, w = picture.shape[:2]
-        x, y, wide, tall = self._place
-        scale = np.array((w / wide, h / tall))
-        places = cv2.transform(uv, np.column_stack([np.diag(scale), (0.5 - np.array((x, y))) * scale - 0.5]))
+        places = cv2.perspectiveTransform(uv, self._to_level(level))
         return sampled(picture, cast(Floats, places), cv2.BORDER_CONSTANT)
+
+    def _to_level(self, level: int) -> Array:
+        """The homography (3, 3) from the first frame to a level's texels."""
+        h, w = self._levels[level].shape[:2]
+        return homography(self._corners, np.array(((0, 0), (w, 0), (w, h), (0, h)), float) - 0.5)
 
     def _level(self, uv: Floats, cover: Floats) -> Floats:
         """The level wanted, on a coarse grid: smooth, so that no step between levels is seen."""
         coarse, inside = uv[::STEP_PX, ::STEP_PX], cover[::STEP_PX, ::STEP_PX] == 1
-        h, w = self._levels[0].shape[:2]
-        texels = coarse * np.array((w / self._place[2], h / self._place[3]), np.float32)
+        texels = cv2.perspectiveTransform(np.ascontiguousarray(coarse), self._to_level(0))
         wanted, known = np.zeros(inside.shape, np.float32), np.zeros(inside.shape, np.float32)
         for a, b in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
             step = np.linalg.norm(texels[b] - texels[a], axis=-1) / STEP_PX

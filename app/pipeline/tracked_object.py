@@ -106,9 +106,10 @@ class TrackedObject:
         assert metric is not None
         model, seen = self.reconstruction.model, self.first.image
         if self._texture is not None:
-            from app.painting.compositing import Placement, painted
+            from app.painting.compositing import painted
+            from app.painting.placement import Placement, corners_of, outline_of
 
-            placement = Placement(self.config.place, self.config.opacity)
+            placement = Placement(corners_of(self.config.place), self.config.opacity, outline_of(self.config.outline))
             seen = painted(seen, self.points_px, model, self._texture, placement)
         return Surface(self.first, self.points_px, model, metric, seen)
 

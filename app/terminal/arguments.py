@@ -19,11 +19,13 @@ class Numbers:
         names: of them.
         example: what a good one looks like.
         more: whether there may be more, in pairs.
+        instead: other numbers that it takes as well.
     """
 
     names: str
     example: str
     more: bool = False
+    instead: str = ""
 
     @property
     def count(self) -> int:
@@ -32,13 +34,15 @@ class Numbers:
 
     def fits(self, count: int) -> bool:
         """Whether so many are right."""
-        return count >= self.count and count % 2 == 0 if self.more else count == self.count
+        if self.more:
+            return count >= self.count and count % 2 == 0
+        return count in {self.count, len(self.instead.split()) or self.count}
 
 
 RECTANGLE = Numbers("X Y WIDTH HEIGHT", "195 95 325 265")
 NUMBERS: Mapping[str, Numbers] = {
     "--roi": RECTANGLE,
-    "--place": Numbers("X Y WIDTH HEIGHT", "250 160 90 60"),
+    "--place": Numbers("X Y WIDTH HEIGHT", "250 160 90 60", instead="X1 Y1 X2 Y2 X3 Y3 X4 Y4"),
     "--corners": Numbers("X1 Y1 X2 Y2 X3 Y3 X4 Y4", "195 95 520 90 515 360 190 355"),
     "--polygon": Numbers("X1 Y1 X2 Y2 X3 Y3", "195 95 520 90 400 360", more=True),
     "--between": Numbers("X1 Y1 X2 Y2", "195 95 520 95"),
@@ -85,7 +89,7 @@ def checked(name: str, given: list[str], following: Sequence[str]) -> list[str]:
     if not given and following and not following[0].startswith("--"):
         told = f"{name} {following[0]}"
     problem = f"has {COUNTS.get(len(given), len(given))} numbers" if given else "has no numbers"
-    pairs = ", and more pairs if wanted" if wanted.more else ""
+    pairs = ", and more pairs if wanted" if wanted.more else f" or {wanted.instead}" if wanted.instead else ""
     raise UsageError(f"{told} {problem}: give {wanted.names}{pairs}, for instance {name} {wanted.example}")
 
 

@@ -62,6 +62,18 @@ def test_a_recording_is_enough(tmp_path: Path, sheet: Path, ending: str) -> None
     assert not list(tmp_path.glob("*.part*"))
 
 
+def test_a_place_by_four_corners_of_another_frame(tmp_path: Path, sheet: Path) -> None:
+    texture, out = tmp_path / "red.png", tmp_path / "new.mp4"
+    cv2.imwrite(str(texture), np.full((20, 30, 3), (20, 20, 240), np.uint8))
+    corners = (70.0, 50.0, 100.0, 46.0, 104.0, 70.0, 68.0, 74.0)
+    retexture(command(sheet, texture, out, place=corners, place_frame=5), Progress())
+    retexture(command(sheet, texture, tmp_path / "bare.mp4", opacity=0.0), Progress())
+    painted, bare = frames_of(out)[5].astype(int), frames_of(tmp_path / "bare.mp4")[5].astype(int)
+    red = np.abs(painted - bare).max(axis=-1) > 40
+    wanted = cv2.fillConvexPoly(np.zeros(red.shape, np.uint8), np.reshape(corners, (4, 2)).astype(np.int32), 1) > 0
+    assert (red & wanted).sum() / (red | wanted).sum() > 0.85
+
+
 def test_a_video_is_painted_as_its_recording_is(tmp_path: Path, videos: Path, texture: Path) -> None:
     out, rrd = tmp_path / "live.mp4", tmp_path / "live.rrd"
     run = command(videos / "turning.mp4", texture, out, points=120, rrd=rrd)
@@ -121,7 +133,9 @@ def test_run_with_a_texture_paints_the_recording(tmp_path: Path, videos: Path, t
         ({"source": "missing.mp4"}, r"no video file missing\.mp4"),
         ({"roi": (1, 2, 30, 40)}, r"--roi is for videos"),
         ({"rrd": Path("x.rrd")}, r"--rrd is for videos"),
-        ({"place": (0, 0, 5, 5)}, r"--place 0 0 5 5 is not on the surface"),
+        ({"place": (0, 0, 5, 5)}, r"--place is not on the surface"),
+        ({"place_frame": 3}, r"--place-frame goes with --place"),
+        ({"place": (60, 40, 30, 30), "place_frame": 77}, r"--place-frame 77: there is no shape in that frame"),
         ({"frames": "90:99"}, r"no frame in 90:99"),
     ],
     ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
@@ -136,8 +150,11 @@ def test_mistakes_are_named(here: Path, sheet: Path, texture: Path, change: dict
     assert (here / "old.mp4").read_text().startswith("words")
 
 
-@pytest.mark.parametrize(("place", "opacity"), [((1, 2, 0, 9), 1.0), ((1, 2, 9, -1), 1.0), (None, 1.5), (None, -0.1)])
-def test_options_that_mean_nothing(place: tuple[int, int, int, int] | None, opacity: float) -> None:
+@pytest.mark.parametrize(
+    ("place", "opacity"),
+    [((1, 2, 0, 9), 1.0), ((1, 2, 9, -1), 1.0), ((1, 1, 9, 9, 9, 1, 1, 9), 1.0), (None, 1.5), (None, -0.1)],
+)
+def test_options_that_mean_nothing(place: tuple[float, ...] | None, opacity: float) -> None:
     with pytest.raises(UsageError, match=r"--place|--opacity"):
         command("a.rrd", Path("b.png"), Path("c.mp4"), place=place, opacity=opacity)
 

@@ -3,8 +3,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.painting.compositing import Compositor, Placement, even
+from app.painting.compositing import Compositor, even
 from app.painting.picture import premultiplied
+from app.painting.placement import Placement, box_corners
+from app.painting.surface import Surface
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import triangulate
 
@@ -93,7 +95,7 @@ def test_opacity_and_alpha_are_shares() -> None:
 
 def test_the_picture_lies_where_it_is_placed() -> None:
     place = (100, 80, 60, 40)
-    painted = paint(compositor(Placement(place)), SCENE)
+    painted = paint(compositor(Placement(box_corners(place))), SCENE)
     changed = (painted != SCENE).any(axis=-1)
     rows, columns = np.nonzero(changed)
     assert np.abs(np.array((columns.min(), rows.min())) - (100, 80)).max() <= 1  # the edge is smooth
@@ -103,8 +105,8 @@ def test_the_picture_lies_where_it_is_placed() -> None:
 
 @pytest.mark.parametrize("place", [(0, 0, 40, 40), (300, 200, 500, 500), (-90, 60, 80, 80)])
 def test_a_place_off_the_surface_is_refused(place: tuple[int, int, int, int]) -> None:
-    with pytest.raises(UsageError, match=r"--place .* is not on the surface, which is between 60 and 259 across"):
-        compositor(Placement(place))
+    with pytest.raises(UsageError, match=r"--place is not on the surface, which is 60 50, 259 50"):
+        compositor(Placement(box_corners(place)))
 
 
 @pytest.mark.parametrize("across", [True, False])
@@ -178,14 +180,14 @@ def test_fine_stripes_become_grey_and_not_moire() -> None:
 
 
 def test_points_that_are_seen_carry_the_surface() -> None:
-    work = compositor()
+    surface = Surface(POINTS, MESH, box_corners(BOX), None)
     seen = POINTS + np.array((1.5, -1.0))
     some = np.random.default_rng(0).random(len(POINTS)) < 0.6
-    corrected = work.corrected(POINTS, np.where(some[:, None], seen, np.nan), some)
+    corrected = surface.corrected(POINTS, np.where(some[:, None], seen, np.nan))
     assert np.abs(corrected - seen).max() < 0.1
     wild = seen.copy()
     wild[70] += 30
-    corrected = work.corrected(POINTS, wild, np.ones(len(POINTS), bool))
+    corrected = surface.corrected(POINTS, wild)
     assert np.linalg.norm(corrected[70] - seen[70]) < 1
 
 

@@ -11,8 +11,9 @@ from app import demo
 from app.demo.camera import shading
 from app.demo.motion import HEIGHT_MM, WIDTH_MM
 from app.options.run import Output, Run
-from app.painting.compositing import Compositor, bounding_box
+from app.painting.compositing import Compositor
 from app.painting.picture import premultiplied
+from app.painting.placement import Placement, bounding_box, box_corners
 from app.pipeline.session import Session
 from app.playback.playback import Playback
 from app.terminal.progress import Progress
@@ -49,6 +50,7 @@ def test_the_demo_is_retextured_as_if_it_were_printed(recording: Path) -> None:
     xy_mm = np.stack([across * WIDTH_MM, down * HEIGHT_MM], axis=-1).reshape(-1, 2)
     first_px = demo.project(demo.surface(0).points(xy_mm)).astype(np.float32).reshape(rows, columns, 2)
     x, y, w, h = bounding_box(playback.texture_px)
+    box = Placement(box_corners((x, y, w, h)))
     small = cv2.GaussianBlur(cv2.resize(card(), (2 * w, 2 * h), interpolation=cv2.INTER_AREA), (0, 0), 0.8)
     within = (first_px - np.float32((x - 0.5, y - 0.5))) * 2 - np.float32(0.5)
     printed = remapped(small, within)
@@ -57,7 +59,7 @@ def test_the_demo_is_retextured_as_if_it_were_printed(recording: Path) -> None:
     for i, image in playback.images():
         assert image is not None
         if work is None:
-            work = Compositor(image, playback.texture_px, playback.mesh, perspective=True)
+            work = Compositor(image, playback.texture_px, playback.mesh, perspective=True, placement=box)
             mesh_cover = work.first(premultiplied(np.full((4, 4, 3), 255, np.uint8)))
             changed = (mesh_cover != image).any(axis=-1).astype(np.float32)
             covered = remapped(cv2.erode(changed, np.ones((3, 3), np.uint8)), first_px) == 1

@@ -1,0 +1,185 @@
+"""The surface that is painted: a regular net that follows the tracked points, and goes on smoothly to the outline."""
+
+from dataclasses import dataclass
+from typing import cast
+
+import cv2
+import numpy as np
+from scipy.sparse import csc_array, csr_array, diags_array, eye_array, kron, vstack
+from scipy.sparse.linalg import splu
+
+from app.arrays import Array, Flags, Indices, Mask
+from reconstruction.basis.mesh import Mesh
+
+NODES = 450  # of the net, about
+BENDING = 0.02  # weight of the net's bending against the points
+TENSION = 0.3  # weight of the differences between nodes' offsets against the points' own
+NEAREST = 0.05  # of the surface's mean depth: what goes on to behind the camera ends there
+ROUNDS = 20  # of diffusing the points' offsets from the shape over their neighbours
+OUTLIER_PX = 1.5  # a point whose offset differs from its neighbours' by this counts half
+
+
+@dataclass(frozen=True)
+class Net:
+    """Nodes (q, 2) px in the first frame, and their triangles (m, 3)."""
+
+    nodes_px: Array
+    faces: Indices
+
+
+class Surface:
+    """Where the net is in a frame.
+
+    Args:
+        reference_px: (p, 2) the vertices in the first frame.
+        mesh: their triangles.
+        quad: (4, 2) px in the first frame, a figure around the surface, along its axes; the outline itself where that has
+            four corners.
+        region: (H, W) 255 where the surface is in the first frame, None: all of the figure.
+
+    Attributes:
+        net: in the first frame.
+        region: as given.
+    """
+
+    def __init__(self, reference_px: Array, mesh: Mesh, quad: Array, region: Mask | None) -> None:
+        wide, tall = (float(np.linalg.norm(quad[k] - quad[0])) for k in (1, 3))
+        side = float(np.sqrt(max(wide * tall, 1.0) / NODES))
+        columns, rows = max(2, round(wide / side)), max(2, round(tall / side))
+        to_net = homography(quad, np.array(((0, 0), (columns, 0), (columns, rows), (0, rows)), float))
+        grid = np.stack(np.meshgrid(np.arange(columns + 1.0), np.arange(rows + 1.0)), axis=-1).reshape(-1, 2)
+        self.net = Net(mapped(grid, cast(Array, np.linalg.inv(to_net))), net_faces(columns, rows))
+        self.region = region
+        if region is not None:
+            self.net = Net(self.net.nodes_px, faces_in(self.net, region))
+        places = mapped(reference_px, to_net)
+        self._shape = Interpolation(places, (columns, rows), bends(columns + 1, rows + 1), BENDING)
+        self._offset = Interpolation(places, (columns, rows), steps(columns + 1, rows + 1), TENSION)
+        self._averages = neighbour_averages(mesh, len(reference_px))
+
+    def nodes(self, projection_px: Array, depth: Array, points_px: Array, *, perspective: bool) -> tuple[Array, Array]:
+        """The net's nodes (q, 2) px in a frame, and their depths (q,).
+
+        Args:
+            projection_px: (p, 2) the vertices as the shape projects them.
+            depth: (p,) their depths.
+            points_px: (p, 2) where they are, by `corrected`.
+            perspective: whether the camera is.
+        """
+        weight = depth[:, None] if perspective else np.ones((len(depth), 1))
+        shape = self._shape(np.column_stack([projection_px * weight, weight, depth]))
+        far = np.maximum(shape[:, 2:3], NEAREST * float(weight.mean()))
+        return np.asarray(shape[:, :2] / far + self._offset(points_px - projection_px)), shape[:, 3]
+
+    def corrected(self, projection_px: Array, observed_px: Array) -> Array:
+        """The vertices (p, 2) where they are seen; others are moved off the shape as their neighbours are."""
+        visible: Flags = np.isfinite(observed_px[:, 0])
+        seen = np.where(visible, (observed_px - projection_px) @ np.array((1, 1j)), 0.0)
+        off = seen
+        for _ in range(ROUNDS):
+            around = self._averages @ off
+            off = around + visible / (1.0 + (np.abs(seen - around) / OUTLIER_PX) ** 2) * (seen - around)
+        return np.asarray(projection_px + np.column_stack([off.real, off.imag]))
+
+
+def first_frame_px(places_px: Array, nodes_px: Array, net: Net) -> Array:
+    """Where places (n, 2) px of a frame with the net's nodes (q, 2) are in the first frame; off it, as at its border."""
+    a, b, c = (nodes_px[net.faces[:, k]] for k in range(3))
+    found = []
+    for place in places_px:
+        along = np.stack([b - a, c - a], axis=-1)
+        flat = np.abs(np.linalg.det(along)) < 1e-9
+        share = np.linalg.solve(np.where(flat[:, None, None], np.eye(2), along), (place - a)[..., None])[..., 0]
+        outside = np.maximum(-share.min(axis=1), share.sum(axis=1) - 1) + 1e9 * flat
+        face = int(np.argmin(outside))
+        weights = np.array((1 - share[face].sum(), *share[face]))
+        found.append(weights @ net.nodes_px[net.faces[face]])
+    return np.array(found)
+
+
+class Interpolation:
+    """Values of a net's nodes by values at points between them, under a penalty; a sparse system that is factorised once.
+
+    Args:
+        places: (p, 2) the points, counted in cells.
+        cells: columns and rows of the net.
+        penalty: (n, q) what should be small of the nodes' values.
+        weight: of its square against the points'.
+    """
+
+    def __init__(self, places: Array, cells: tuple[int, int], penalty: csr_array, weight: float) -> None:
+        columns, rows = cells
+        cell = np.clip(np.floor(places), 0, np.array(cells) - 1).astype(np.int64)
+        x, y = (places - cell).T
+        first = cell[:, 1] * (columns + 1) + cell[:, 0]
+        number = first[:, None] + np.array((0, 1, columns + 1, columns + 2))
+        share = np.column_stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y])
+        at = (np.repeat(np.arange(len(places)), 4), number.ravel())
+        bilinear = csr_array((share.ravel(), at), shape=(len(places), (columns + 1) * (rows + 1)))
+        self._to_nodes = csr_array(bilinear.T)
+        normal = self._to_nodes @ bilinear + weight * (penalty.T @ penalty)
+        self._factors = splu(csc_array(normal + 1e-9 * eye_array(normal.shape[0])))
+
+    def __call__(self, values: Array) -> Array:
+        """The nodes' values (q, k) by the points' (p, k)."""
+        return cast(Array, self._factors.solve(self._to_nodes @ values))
+
+
+def bends(columns: int, rows: int) -> csr_array:
+    """Second differences (n, q) of the nodes of a net: 0 for what is flat."""
+    across, down = differences(columns), differences(rows)
+    twice = (
+        kron(eye_array(rows), differences(columns - 1) @ across),
+        kron(differences(rows - 1) @ down, eye_array(columns)),
+    )
+    return cast(csr_array, csr_array(vstack([*twice, np.sqrt(2) * kron(down, across)])))
+
+
+def steps(columns: int, rows: int) -> csr_array:
+    """First differences (n, q) of the nodes of a net."""
+    both = (kron(eye_array(rows), differences(columns)), kron(differences(rows), eye_array(columns)))
+    return cast(csr_array, csr_array(vstack(both)))
+
+
+def differences(count: int) -> csr_array:
+    """From numbers in a row to the steps between them (count − 1, count)."""
+    return cast(csr_array, csr_array(diags_array([-1.0, 1.0], offsets=[0, 1], shape=(count - 1, count))))
+
+
+def net_faces(columns: int, rows: int) -> Indices:
+    """Triangles (m, 3) of a net with so many cells."""
+    x, y = np.meshgrid(np.arange(columns), np.arange(rows))
+    a = (y * (columns + 1) + x).ravel()
+    b, c, d = a + 1, a + columns + 1, a + columns + 2
+    return np.concatenate([np.column_stack([a, b, d]), np.column_stack([a, d, c])]).astype(np.int64)
+
+
+def faces_in(net: Net, region: Mask) -> Indices:
+    """The net's triangles that reach into a region (H, W)."""
+    wide = cv2.dilate(region, np.ones((3, 3), np.uint8))
+    height, width = region.shape
+    inside = np.zeros(len(net.faces), bool)
+    weights = np.array([(i, j, 4 - i - j) for i in range(5) for j in range(5 - i)]) / 4
+    for weight in weights:
+        x, y = np.rint(np.einsum("k,fkc->fc", weight, net.nodes_px[net.faces])).astype(int).T
+        within = (x >= 0) & (y >= 0) & (x < width) & (y < height)
+        inside |= within & (wide[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)] > 0)
+    return net.faces[inside]
+
+
+def homography(source: Array, target: Array) -> Array:
+    """The (3, 3) map of four points (4, 2) onto four others."""
+    return cast(Array, cv2.getPerspectiveTransform(source.astype(np.float32), target.astype(np.float32)))
+
+
+def mapped(points: Array, by: Array) -> Array:
+    """Points (n, 2) under a homography (3, 3)."""
+    return cast(Array, cv2.perspectiveTransform(points[None].astype(np.float64), by)[0])
+
+
+def neighbour_averages(mesh: Mesh, vertices: int) -> csr_array:
+    """A matrix (p, p) that replaces each vertex's value by the mean of its neighbours'."""
+    a, b = mesh.edges.T
+    degree = np.maximum(np.bincount(mesh.edges.ravel(), minlength=vertices), 1).astype(float)
+    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
+    return csr_array((1.0 / degree[rows], (rows, columns)), shape=(vertices, vertices))
