@@ -1,6 +1,7 @@
 """Optical flow of points, checked forward and backward, and started from the motion of a few well-spread guides."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import cv2
@@ -17,6 +18,9 @@ GUIDES = 150
 GUIDE_WINDOWS_PX = (11, 31)  # of the half picture; the second for those that do not come back with the first
 GUIDE_LEVELS = 3  # halvings of a half picture 320 px wide
 NEAREST_GUIDES = 8  # guides whose median motion a point starts from
+FEW_GUIDES = 0.7  # of the guides: come fewer back, the light may have changed
+EVENED_PX = 31  # side of the squares over which light is evened out: smaller than bands of light, larger than a window
+EVENED_NOISE = 4.0  # grey levels of contrast, below which there is nothing to be evened
 GUESSED_PX = 1.0  # what ends so near to where its guides went needs not come back
 RETURN_PX = 1.0  # forward and backward again must end so near to the start
 CONVERGED_PX, RETURN_CONVERGED_PX = 0.03, 0.1  # shorter steps end the search; alignment to appearance follows
@@ -40,6 +44,15 @@ class Grays:
         """Of a picture (H, W, 3) uint8."""
         gray = cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)
         return cls(cast(Image, gray), cast(Image, cv2.pyrDown(gray)))
+
+    @cached_property
+    def evened(self) -> "Grays":
+        """The same without the light: each pixel against the mean of those around it, by their contrast."""
+        gray, side = self.full.astype(np.float32), (EVENED_PX, EVENED_PX)
+        mean = cv2.blur(gray, side)
+        contrast = np.sqrt((cv2.sqrBoxFilter(gray, cv2.CV_32F, side) - mean**2).clip(EVENED_NOISE**2))
+        full = cv2.convertScaleAbs(128.0 + 48.0 * (gray - mean) / contrast)
+        return Grays(cast(Image, full), cast(Image, cv2.pyrDown(full)))
 
 
 def spread_order(points_px: Array) -> Indices:
@@ -72,12 +85,14 @@ class Flow:
         seen = np.flatnonzero(np.isfinite(points_px[:, 0]))
         if len(seen) == 0:  # OpenCV raises
             return moved
-        levels = GUIDE_LEVELS + max(0, round(np.log2(max(now.half.shape) / 320.0)))
-        motion = self._guess(before, now, points_px, levels)[seen]
-        if np.isfinite(motion[0, 0]):
-            levels = 0
-        else:
-            motion, levels = np.zeros_like(motion), levels + 1
+        motion, share = self._guess(before, now, points_px)
+        if share < FEW_GUIDES:  # a change of light is no motion
+            its_motion, its_share = self._guess(before.evened, now.evened, points_px)
+            if its_share >= FEW_GUIDES:
+                before, now, motion = before.evened, now.evened, its_motion
+        motion, levels = motion[seen], 0
+        if not np.isfinite(motion[0, 0]):
+            motion, levels = np.zeros_like(motion), levels_of(now) + 1
         start = points_px[seen]
         there, good = lucas_kanade(before.full, now.full, start, motion, WINDOW_PX, levels, CONVERGED_PX)
         far = np.flatnonzero(np.linalg.norm(there - start - motion, axis=1) > GUESSED_PX)
@@ -85,8 +100,12 @@ class Flow:
         moved[seen[good]] = there[good]
         return moved
 
-    def _guess(self, before: Grays, now: Grays, points_px: Array, levels: int) -> Array:
-        """The median motion of the guides nearest to each point in the reference frame: (P, 2); NaN if they are few."""
+    def _guess(self, before: Grays, now: Grays, points_px: Array) -> tuple[Array, float]:
+        """The median motion of the guides nearest to each point in the reference frame: (P, 2); NaN if they are few.
+
+        And the share of the guides that came back.
+        """
+        levels = levels_of(now)
         guides = self._order[np.isfinite(points_px[self._order, 0])][:GUIDES]
         start = points_px[guides] / 2
         moved, good = np.zeros_like(start), np.zeros(len(start), np.bool_)
@@ -98,14 +117,19 @@ class Flow:
                 good[left] = found & returned(before.half, now.half, start[left], moved[left], still, window, levels)
         guides, motion = guides[good], 2 * (moved - start)[good]
         if len(guides) < NEAREST_GUIDES:
-            return np.full_like(points_px, np.nan)
+            return np.full_like(points_px, np.nan), 0.0
         if not np.array_equal(guides, self._guides):  # seldom
             nearest = cv2.batchDistance(
                 self._reference, self._reference[guides], cv2.CV_32F, normType=cv2.NORM_L2SQR, K=NEAREST_GUIDES
             )[1]
             self._guides, self._nearest = guides, np.asarray(nearest, np.int64)
         middle = slice(NEAREST_GUIDES // 2 - 1, NEAREST_GUIDES // 2 + 1)
-        return cast(Array, np.sort(motion.T[:, self._nearest], axis=2)[:, :, middle].mean(axis=2).T)
+        return cast(Array, np.sort(motion.T[:, self._nearest], axis=2)[:, :, middle].mean(axis=2).T), float(good.mean())
+
+
+def levels_of(grays: Grays) -> int:
+    """Halvings of a half picture in which guides are followed."""
+    return GUIDE_LEVELS + max(0, round(np.log2(max(grays.half.shape) / 320.0)))
 
 
 def lucas_kanade(
