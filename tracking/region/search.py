@@ -5,15 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracking import Array, Image, TrackingError
+from tracking import Array, Flags, Image, TrackingError
 from tracking.features import detect_corners
-from tracking.flow import CONVERGED_PX, GUIDE_LEVELS, Grays, lucas_kanade, returned
-from tracking.region.surface import Surface, surfaces
+from tracking.flow import CONVERGED_PX, FEW_GUIDES, Grays, levels_of, lucas_kanade, returned
+from tracking.region.surface import FAR_ENOUGH, STILL_PX, Surface, middling, surfaces
 from tracking.video import Frame
 
 MOST_FRAMES = 90  # are looked at
-ENOUGH = 0.05  # of the picture's larger side: when the farthest tenth has moved so far, that is enough
-TENTH = 0.9
+TENTH = 0.9  # when the farthest tenth of what is in the middle has moved `FAR_ENOUGH`, that is enough
+MIDDLE = 0.5  # of a region that was drawn: nearer to its middle than to its border
+CUT = 0.3  # of the points seen just before: fewer, and it is another picture
+CLEARER = 2.0  # times the contrast of the first frame: it was still fading in
 COMPARED = 20  # of those frames that are compared
 WINDOW_PX = 15
 FEWEST, POINTS = 50, 800
@@ -62,6 +64,9 @@ class Search:
         most = int(np.clip(np.count_nonzero(region) // WINDOW_PX**2, FEWEST, POINTS))
         self._tracks = [detect_corners(self._grays.full, region, most)]
         self._way = np.zeros(len(self._tracks[0]))  # of each point so far, at most
+        middle = middling(self._tracks[0], region) >= MIDDLE
+        self._middle = middle if middle.any() else ~middle
+        self._contrast = self._contrast_now()
 
     @property
     def frames(self) -> int:
@@ -69,23 +74,30 @@ class Search:
         return len(self._tracks)
 
     @property
+    def moved_px(self) -> float:
+        """How far the farthest tenth of what is in the middle has moved."""
+        return float(np.quantile(self._way[self._middle], TENTH))
+
+    @property
     def enough(self) -> bool:
         """Whether further frames would not tell more."""
-        return self.frames >= MOST_FRAMES or float(np.quantile(self._way, TENTH)) > ENOUGH * max(self._region.shape)
+        return self.frames >= MOST_FRAMES or self.moved_px > FAR_ENOUGH * max(self._region.shape)
 
-    def add(self, image_bgr: Image) -> None:
-        """Look at the next frame."""
-        before, self._grays, last = self._grays.full, Grays.of(image_bgr), self._tracks[-1]
-        now, moved = self._grays.full, np.full_like(last, np.nan)
-        seen = np.flatnonzero(np.isfinite(last[:, 0]))
+    def add(self, image_bgr: Image) -> bool:
+        """Look at the next frame; False if it is another picture, or the same one much clearer: nothing of it is kept."""
+        before, self._grays, last = self._grays, Grays.of(image_bgr), self._tracks[-1]
+        moved, seen = np.full_like(last, np.nan), np.flatnonzero(np.isfinite(last[:, 0]))
         if len(seen):
-            start, levels = last[seen], GUIDE_LEVELS + 1 + max(0, round(np.log2(max(now.shape) / 640.0)))
-            still = np.zeros_like(start)  # no guides: what has no texture would go where they go
-            there, good = lucas_kanade(before, now, start, still, WINDOW_PX, levels, CONVERGED_PX)
-            good &= returned(before, now, start, there, still, WINDOW_PX, levels)
+            there, good = followed(before, self._grays, last[seen])
+            if good.mean() < FEW_GUIDES:  # a change of light is no motion
+                evened, also = followed(before.evened, self._grays.evened, last[seen])
+                there, good = (evened, also) if also.sum() > good.sum() else (there, good)
             moved[seen[good]] = there[good]
+            if good.sum() < CUT * len(seen) or self._contrast_now() > CLEARER * self._contrast:
+                return False
         self._tracks.append(moved)
         self._way = np.fmax(self._way, np.linalg.norm(moved - self._tracks[0], axis=1))
+        return True
 
     def surfaces(self) -> list[Surface]:
         """What moves, by the frames so far, the best first."""
@@ -96,34 +108,51 @@ class Search:
         chosen = np.unique(np.linspace(0, self.frames - 1, COMPARED).round().astype(int))
         return np.stack([self._tracks[k] for k in chosen])
 
+    def _contrast_now(self) -> float:
+        """Standard deviation of the grey levels in the region."""
+        return float(self._grays.half[self._region[::2, ::2] > 0].std())
+
+
+def followed(before: Grays, now: Grays, points_px: Array) -> tuple[Array, Flags]:
+    """Where points (n, 2) went, and whether that is known; without guides: what has no texture would go where they go."""
+    still, levels = np.zeros_like(points_px), levels_of(now) + 1
+    there, good = lucas_kanade(before.full, now.full, points_px, still, WINDOW_PX, levels, CONVERGED_PX)
+    return there, good & returned(before.full, now.full, points_px, there, still, WINDOW_PX, levels)
+
 
 def search(frames: Iterable[Frame], region: Image) -> Found:
-    """Look for the surface in a region (H, W) uint8 of the first frames, past those without texture.
+    """Look for the surface in a region (H, W) uint8 of the first frames.
+
+    Past those without texture, those that fade in, and a picture that is cut away before anything in it has moved.
 
     Raises:
         TrackingError: no frame has enough corners.
     """
-    begun: Search | None = None
+    begun: tuple[Search, Frame] | None = None
+    earlier = begun  # what there was before a cut, if nothing comes after it
     blank = TrackingError("there is no frame")
-    first: Frame | None = None
     for waited, frame in enumerate(frames):
-        if begun is None or first is None:
-            try:
-                begun, first = Search(frame.image, region), frame
-            except TrackingError as error:
-                blank = error
-                if waited >= BLANK_FRAMES:
-                    raise
-            continue
-        begun.add(frame.image)
-        if begun.enough:
-            break
-    if begun is None or first is None:
+        if begun is not None:
+            same = begun[0].add(frame.image)
+            if begun[0].enough or (not same and begun[0].moved_px > STILL_PX):
+                break
+            if same:
+                continue
+            earlier, begun = begun, None
+        try:
+            begun = Search(frame.image, region), frame
+        except TrackingError as error:
+            blank = error
+            if waited >= BLANK_FRAMES:
+                break
+    begun = begun or earlier
+    if begun is None:
         raise blank
-    moving = begun.surfaces()
+    looked, first = begun
+    moving = looked.surfaces()
     if not moving:
-        return Found(first, region, None, [], begun.frames, narrowed=False)
+        return Found(first, region, None, [], looked.frames, narrowed=False)
     best = moving[0]
     left_out = ~best.own if region.all() else best.other  # nobody has chosen a picture's corners
     narrowed = float(left_out.mean()) > LEFT_OUT
-    return Found(first, best.mask if narrowed else region, best, moving[1:], begun.frames, narrowed)
+    return Found(first, best.mask if narrowed else region, best, moving[1:], looked.frames, narrowed)

@@ -17,6 +17,8 @@ SHARED = 0.5  # ... one that goes so much of its way: a lip or a chin goes farth
 SPACING = 3  # the neighbour whose distance is the usual one
 REACH = 1.0  # times the usual distance between points on it, that the surface goes on beyond them
 GAP = 2.0  # the same: narrower gaps between its parts are its own
+FAR_ENOUGH = 0.05  # of the picture's larger side: what has moved so far in a region that was drawn has moved
+HOLE = 15  # points of something else in a hole of the surface: with fewer, it is none
 OTHER_SHARE = 0.1  # of the best group's score: less, and a group is not worth a word
 
 
@@ -46,14 +48,28 @@ class Surface:
 def surfaces(W: Array, region: Image) -> list[Surface]:
     """What moves in a region, the one with most points times motion first, those not worth a word left out.
 
+    A region that was drawn was drawn around the surface: points in its middle count most, those on its border nothing.
+
     Args:
         W: (F, P, 2) px, tracks of points of the region; NaN where not seen.
         region: (H, W) uint8, 255 inside.
     """
-    found = groups_of(W, float(max(region.shape)))
-    score = np.where(found.motion_px > STILL_PX, found.sizes * found.motion_px, 0.0)
+    found, side = groups_of(W, float(max(region.shape))), max(region.shape)
+    weight = middling(W[0], region)[found.label >= 0]
+    size = np.bincount(found.label[found.label >= 0], weight, len(found.motion_px))
+    way = found.motion_px if region.all() else found.motion_px.clip(max=FAR_ENOUGH * side)
+    score = np.where(found.motion_px > STILL_PX, size * way, 0.0)
     order = [int(k) for k in np.argsort(-score, kind="stable") if score[k] > OTHER_SHARE * score.max()]
     return [surface_of(W, found.label == k, found.label >= 0, region) for k in order]
+
+
+def middling(place: Array, region: Image) -> Array:
+    """How near points (P, 2) px are to the middle of a region, 1 there and 0 at its border, (P,); 1 in a whole picture."""
+    if region.all():
+        return np.ones(len(place))
+    x, y, w, h = cv2.boundingRect(region)
+    off = np.abs(2 * (place - (x, y) + 0.5) / (w, h) - 1)
+    return np.asarray(1 - off.max(axis=1)).clip(0)
 
 
 def surface_of(W: Array, group: Flags, grouped: Flags, region: Image) -> Surface:
@@ -109,9 +125,20 @@ def surface_mask(place: Array, own: Flags, others: Flags, region: Image) -> Imag
     near = nearer * (to_own < REACH * spacing)
     whole = cv2.morphologyEx(near, cv2.MORPH_CLOSE, disc(GAP * spacing)) * nearer
     smooth = cv2.morphologyEx(whole, cv2.MORPH_OPEN, disc(REACH * spacing))
-    contours = cv2.findContours(smooth, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
+    contours, levels = cv2.findContours(smooth, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     mask = np.zeros(region.shape[:2], np.uint8)
-    cv2.drawContours(mask, contours, -1, (255,), cv2.FILLED)
+    cv2.drawContours(
+        mask, [c for c, level in zip(contours, levels[0], strict=True) if level[3] < 0], -1, (255,), cv2.FILLED
+    )
+    x, y = np.rint(place[others]).astype(int).T
+    for contour, level in zip(contours, levels[0], strict=True):
+        hole = np.zeros_like(mask)
+        if (
+            level[3] >= 0
+            and len(cv2.drawContours(hole, [contour], -1, (255,), cv2.FILLED))
+            and np.count_nonzero(hole[y, x]) >= HOLE
+        ):
+            mask[(hole > 0) & (smooth == 0)] = 0
     return cast(Image, mask & region)
 
 

@@ -66,7 +66,7 @@ def notes_on(found: Found, began: int) -> list[str]:
         began: number of the first frame looked at.
     """
     blank = found.first.index - began
-    notes = [f"waited {blank} frames for texture: begins with frame {found.first.index}"] if blank else []
+    notes = [f"nothing to follow in the first {blank} frames: begins with frame {found.first.index}"] if blank else []
     if found.surface is None:
         return [*notes, f"nothing moves in {found.frames} frames: the whole region is taken; choose by --roi X Y W H"]
     if not found.narrowed:
