@@ -18,6 +18,7 @@ Log = Callable[[str], None]
 
 PATIENCE_S = 60.0  # a broken stream is waited for
 RETRY_S = 0.5  # between two attempts
+MOST_ASPECT, LEAST_ASPECT = 4.0, 0.005  # of pixels: beyond is a mistake, below is rounding
 PROBED = 12  # frames: more than a decoder reorders
 TIMEOUT_MS = 5000  # a server that says nothing for so long is gone
 
@@ -77,6 +78,45 @@ class Reconnecting:
         self._capture.release()
 
 
+class SquarePixels:
+    """A video whose pixels are not square, stretched as players show it; reads like a cv2.VideoCapture.
+
+    Args:
+        capture: the video.
+        aspect: width of a pixel over its height.
+    """
+
+    def __init__(self, capture: Capture, aspect: float) -> None:
+        self._capture, self._wider, self._higher = capture, max(aspect, 1.0), max(1.0 / aspect, 1.0)
+        self.grab, self.get, self.release = capture.grab, capture.get, capture.release
+
+    def retrieve(self) -> tuple[bool, Image]:
+        """Decode the picture gone to."""
+        ok, image = self._capture.retrieve()
+        return ok, self.stretched(image) if ok and image is not None and image.size else image
+
+    def stretched(self, image: Image) -> Image:
+        """A picture with square pixels: larger, so that nothing is lost."""
+        size = round(image.shape[1] * self._wider), round(image.shape[0] * self._higher)
+        return cast(Image, cv2.resize(image, size, interpolation=cv2.INTER_CUBIC))
+
+
+def pixel_aspect(capture: Capture) -> float:
+    """Width of a video's pixels over their height; 1 where it does not say, or what nobody believes."""
+    wide, high = capture.get(cv2.CAP_PROP_SAR_NUM), capture.get(cv2.CAP_PROP_SAR_DEN)
+    aspect = wide / high if wide > 0 and high > 0 else 1.0
+    return aspect if 1 / MOST_ASPECT < aspect < MOST_ASPECT else 1.0
+
+
+def squared(capture: Capture, source: str, log: Log) -> Capture:
+    """A capture of square pixels; `log` is told where the video's are not."""
+    aspect = pixel_aspect(capture)
+    if abs(aspect - 1) < LEAST_ASPECT:
+        return capture
+    log(f"the pixels of {source} are {aspect:.3g} times as wide as high: it is read with square ones, as players show it")
+    return SquarePixels(capture, aspect)
+
+
 def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
     """Open a source; `closing` and `log` as for `Reconnecting`.
 
@@ -92,10 +132,10 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
         capture = open_url(source)
         if not cast(cv2.VideoCapture, capture).isOpened():
             raise TrackingError(f"{source} cannot be decoded; check the address")
-        return capture if announced_frames(capture) else Reconnecting(source, capture, closing, log)
+        return squared(capture, source, log) if announced_frames(capture) else Reconnecting(source, capture, closing, log)
     path = Path(source)
     if re.search(r"%0?\d*d", source) and not path.exists():
-        return ImageFiles(source)
+        return ImageFiles(source, log)
     if path.is_dir():
         raise TrackingError(f"{source} is a folder; give the images in it by a pattern, as {source}/img%04d.png")
     if not path.is_file():
@@ -105,7 +145,7 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
     file = cv2.VideoCapture(source)
     if not file.isOpened():
         raise TrackingError(f"{source} cannot be decoded; it is not a video, or it is damaged or cut off")
-    return cast(Capture, file)
+    return squared(cast(Capture, file), source, log)
 
 
 def times_rise(source: str) -> bool:

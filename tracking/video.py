@@ -49,7 +49,7 @@ class Video:
         stop: index of the first frame not delivered any more; None reads to the end.
         duration_s: so long after the first frame the video ends; None for no limit.
         drop_late: of a live source, deliver always the newest frame and drop those nobody had time for.
-        log: told in words when a stream breaks and resumes; called in another thread.
+        log: told in words what is unusual: pixels, missing images, and, in another thread, that a stream breaks or resumes.
 
     Attributes:
         live: whether frames come when they happen: a camera, or a stream without end. Their time stamps are

@@ -1,7 +1,7 @@
 """Pictures as a recording stores them: frames as JPEG, the video file as it is, the mesh's texture."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 import cv2
 import numpy as np
@@ -10,6 +10,7 @@ import rerun as rr
 from app.arrays import Array, Image, Indices
 from app.recording.columns import Values
 from app.terminal.errors import UsageError
+from tracking.capture import Capture, pixel_aspect
 
 JPEG_QUALITY = 75  # of a video that was compressed before; 85 looks the same and takes 1.4 times as much
 
@@ -24,10 +25,12 @@ def embedded_video(video: Path | None) -> tuple[rr.AssetVideo, Indices]:
     """A video file as it is, and its frames' time stamps (F,) in nanoseconds.
 
     Raises:
-        UsageError: not a file, or not a container and codec that Rerun knows.
+        UsageError: not a file, not a container and codec that Rerun knows, or pixels that are not square.
     """
     if video is None or not video.is_file():
         raise UsageError("--image video needs a video file as the source: use --image jpeg")
+    if pixel_aspect(cast(Capture, cv2.VideoCapture(str(video)))) != 1:
+        raise UsageError(f"the pixels of {video} are not square, which viewers do not know: use --image jpeg")
     try:
         asset = rr.AssetVideo(path=video)
         return asset, np.sort(np.asarray(asset.read_frame_timestamps_nanos(), np.int64))

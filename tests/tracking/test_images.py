@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tracking.images import missing_numbers
 from tracking.video import Frame, Video
 
 AV1 = Path(__file__).with_name("data") / "av1.mp4"
@@ -38,6 +39,29 @@ def test_goes_on_past_damaged_images(images: Path) -> None:
     for i, data in ((9, b""), (10, b"no picture")):
         (images.parent / f"img{i:04d}.png").write_bytes(data)
     assert [f.index for f in frames(images)] == [0, 1, 4, 5, 6, 7, 8, 9]
+
+
+def test_frames_keep_their_numbers_where_images_are_missing(images: Path) -> None:
+    (images.parent / "img0010.png").unlink()
+    told: list[str] = []
+    with Video(str(images), log=told.append) as video:
+        found = list(video)
+    assert [f.index for f in found] == [0, 1, 2, 4, 5, 6, 7, 8, 9]
+    assert told == ["missing of the images img%04d.png: number 10; those frames are left out"]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "missing"),
+    [
+        ([5], []),
+        ([0, 10, 20, 30], []),
+        ([*range(0, 200, 10), 210], [200]),
+        ([3, 17, 18, 95, 400], []),  # they count something else
+        ([*range(300), *range(400, 700)], []),  # another shot
+    ],
+)
+def test_what_is_missing_among_numbers(numbers: list[int], missing: list[int]) -> None:
+    assert missing_numbers(numbers) == missing
 
 
 @pytest.mark.parametrize("kind", ["gray", "alpha", "deep"])
