@@ -8,7 +8,11 @@ from typing import NoReturn
 
 def main() -> NoReturn:
     """Carry out what the command line asks for."""
-    isolate()
+    try:
+        isolate()
+    except FileNotFoundError:
+        sys.stderr.write("error: the current folder is gone: change to another\n")
+        sys.exit(2)
     from app.commands.cli import main as run
 
     run()

@@ -4,7 +4,6 @@ import csv
 import hashlib
 import io
 import os
-import shlex
 import subprocess
 import threading
 from collections import Counter
@@ -14,17 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rich.box import SIMPLE
-from rich.console import Console
 from rich.table import Table
 
 from app.commands.batch_job import UNFINISHED, Job, carry_out
+from app.files.locks import locked
 from app.files.names import stem
 from app.files.writing import writable
 from app.options.batch import Batch
-from app.terminal.arguments import spelled_out
+from app.terminal.arguments import spelled_out, words_of
 from app.terminal.errors import UsageError
 from app.terminal.exit_code import ExitCode
 from app.terminal.progress import Progress
+from app.terminal.streams import Tables
 from app.terminal.summary import Summary
 
 COLUMNS = (
@@ -73,7 +73,7 @@ class Outcome(Summary):
                 f"{error_px:.2f}" if isinstance(error_px, float) else "",
                 told,
             )
-        Console().print(table, highlight=False, markup=False)
+        Tables().print(table)
 
     @property
     def exit_code(self) -> ExitCode:
@@ -85,9 +85,15 @@ def batch(command: Batch, progress: Progress) -> Outcome:
     """Run the videos that are not done yet, and list all.
 
     Raises:
-        UsageError: the folder cannot be written, or there is no such scheduler.
+        UsageError: the folder cannot be written, another batch writes there, or there is no such scheduler.
     """
     jobs = make_jobs(command)
+    with locked(command.out, f"another batch writes to {command.out}: wait for it, or choose another folder with --out"):
+        return carried_out(command, jobs, progress)
+
+
+def carried_out(command: Batch, jobs: list[Job], progress: Progress) -> Outcome:
+    """What came of the jobs, in a folder that is ours."""
     results: dict[str, dict[str, object]] = {}
     for job in jobs:
         before = job.done()
@@ -125,6 +131,7 @@ def make_jobs(command: Batch) -> list[Job]:
         (folder / UNFINISHED).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UsageError(f"cannot write to {folder}: {error.strerror}; choose another folder with --out") from error
+    options = words_of("--options", command.options)
     own = dict.fromkeys(map(whole, command.videos), ()) | (own_options(command.table) if command.table else {})
     videos = list(own)
     stems = Counter(Path(video).stem for video in videos)
@@ -133,8 +140,8 @@ def make_jobs(command: Batch) -> list[Job]:
     found = []
     for video in videos:
         name = stem(video)
-        digest = hashlib.sha256(video.encode()).hexdigest()[:8]
-        job = Job(video, name, folder, (*shlex.split(command.options), *own[video]), cores)
+        digest = hashlib.sha256(os.fsencode(video)).hexdigest()[:8]
+        job = Job(video, name, folder, (*options, *own[video]), cores)
         if stems[Path(video).stem] > 1 or (job.report.exists() and job.done() is None):
             job = Job(video, f"{name}-{digest}", folder, job.options, cores)
         found.append(job)
@@ -152,6 +159,8 @@ def own_options(path: Path) -> dict[str, tuple[str, ...]]:
     Raises:
         UsageError: it cannot be read, or has no such column.
     """
+    if path.exists() and not path.is_file():
+        raise UsageError(f"--table {path} is no file: give a table, as a .csv file")
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.DictReader(file, skipinitialspace=True))

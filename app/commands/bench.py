@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 
-from rich.console import Console
 from rich.table import Table
 from threadpoolctl import threadpool_limits
 
@@ -17,6 +16,7 @@ from app.files.writing import check_free, writable
 from app.options.bench import Bench
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
+from app.terminal.streams import Tables
 from app.terminal.summary import Summary
 
 Row = dict[str, object]
@@ -40,7 +40,7 @@ class Benchmarks(Summary):
 
     def print_table(self) -> None:
         """The tables, and the ratios beside their targets."""
-        console = Console()
+        console = Tables()
         tables = {"Window step": self.window, "Rivals": self.rivals, "Basis": self.basis, "Whole runs": self.runs}
         for title, measured in tables.items():
             console.print(as_table(title, measured))

@@ -6,6 +6,7 @@ import os
 import re
 import signal
 import sys
+import warnings
 from functools import reduce
 from importlib import import_module
 from operator import or_
@@ -27,6 +28,7 @@ from app.options.run import Demo, Run
 from app.terminal.arguments import meant, spelled_out
 from app.terminal.errors import UsageError, in_a_line
 from app.terminal.exit_code import ExitCode
+from app.terminal.streams import prepare, standard_output
 
 # Each command: its options, and the function that carries it out, given options and progress; it returns a summary.
 COMMANDS: dict[str, tuple[type, str]] = {
@@ -44,6 +46,8 @@ COMMANDS: dict[str, tuple[type, str]] = {
     "bench": (Bench, "app.commands.bench:bench"),
 }
 
+ENDING = (signal.SIGTERM, signal.SIGHUP)
+
 DESCRIPTION = """One ordinary video of a deforming surface becomes a moving 3-D mesh, live.
 
 Start with `modeshape demo`, then `modeshape run your_video.mp4`, or
@@ -53,22 +57,32 @@ Start with `modeshape demo`, then `modeshape run your_video.mp4`, or
 def main() -> NoReturn:
     """Entry point of the `modeshape` script; see `ExitCode` for how it ends."""
     os.environ.update(environment())
+    prepare()
     try:
-        sys.exit(carry_out(parse(sys.argv[1:])))
-    except ValueError as error:
-        if not is_ours(error):
-            raise
-        fail(in_a_line(error))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of numbers: the verdict says what they are worth
+            sys.exit(carry_out(parse(sys.argv[1:])))
     except KeyboardInterrupt:
         sys.exit(ExitCode.INTERRUPTED)
+    except Exception as error:
+        if isinstance(error, OSError) and error.filename is not None:
+            fail(f"{error.filename}: {error.strerror}")
+        if not is_ours(error):
+            fail(unforeseen(error), ExitCode.OUR_MISTAKE)
+        fail(in_a_line(error))
 
 
 def parse(arguments: list[str]) -> Any:
     """The options of the command asked for; a mistake is told in one line instead of a panel.
 
     Raises:
-        UsageError: a list of numbers that is none.
+        UsageError: a list of numbers that is none, or a name that is not UTF-8.
     """
+    for argument in arguments:
+        try:
+            argument.encode()
+        except UnicodeEncodeError:
+            raise UsageError(f"{argument} is not UTF-8, which the names of files have to be here: rename it") from None
     kinds = {name: kind for name, (kind, _) in COMMANDS.items()}
     if arguments == ["--version"]:
         from importlib.metadata import version
@@ -83,7 +97,7 @@ def parse(arguments: list[str]) -> Any:
     commands: Any = reduce(or_, [Annotated[kind, tyro.conf.subcommand(one)] for one, kind in kinds.items()])
     complaint = io.StringIO()
     try:
-        with contextlib.redirect_stderr(complaint):
+        with contextlib.redirect_stderr(complaint), standard_output():
             return tyro.cli(
                 commands,
                 prog="modeshape",
@@ -113,7 +127,8 @@ def with_hint(complaint: str, name: str) -> str:
 
 def show(text: str) -> NoReturn:
     """Print, and end."""
-    sys.stdout.write(text)
+    with standard_output():
+        sys.stdout.write(text)
     sys.exit(ExitCode.DONE)
 
 
@@ -131,24 +146,27 @@ def carry_out(options: Any) -> ExitCode:
     from app.terminal.progress import Progress
     from app.terminal.summary import Summary
 
-    signal.signal(signal.SIGTERM, interrupt)
+    for number in ENDING:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup does
+            signal.signal(number, interrupt)
     module, function = next(place for kind, place in COMMANDS.values() if kind is type(options)).split(":")
     summary: Summary = getattr(import_module(module), function)(options, Progress())
-    if options.json:
-        sys.stdout.write(summary.as_json() + "\n")
-    else:
-        summary.print_table() if options.verbose else summary.print_short()
-        if summary.hint:
-            sys.stderr.write(f"{summary.hint}\n")
+    with standard_output():
+        if options.json:
+            sys.stdout.write(summary.as_json() + "\n")
+        else:
+            summary.print_table() if options.verbose else summary.print_short()
+    if summary.hint and not options.json:
+        sys.stderr.write(f"{summary.hint}\n")
     return summary.exit_code
 
 
 def interrupt(_signum: int, _frame: object) -> NoReturn:
-    """SIGTERM ends a run as Ctrl-C does: with everything so far kept."""
+    """A signal ends a run as Ctrl-C does: with everything so far kept."""
     raise KeyboardInterrupt
 
 
-def is_ours(error: ValueError) -> bool:
+def is_ours(error: Exception) -> bool:
     """Whether an error names the thing and the remedy, so that a traceback would only be in the way."""
     if isinstance(error, UsageError):
         return True
@@ -158,7 +176,26 @@ def is_ours(error: ValueError) -> bool:
     return isinstance(error, ReconstructionError | TrackingError)
 
 
-def fail(text: str) -> NoReturn:
-    """One line on stderr, exit code 2."""
-    sys.stderr.write(f"error: {text}\n")
-    sys.exit(ExitCode.BAD_INPUT)
+def unforeseen(error: Exception) -> str:
+    """What nobody has thought of, in a line; where it happened is in a file."""
+    import tempfile
+    import traceback
+
+    told = f"{type(error).__name__}: {' '.join(str(error).split())}"
+    if isinstance(error, MemoryError):
+        told = "the memory is full"
+    if "--verbose" in sys.argv:
+        sys.stderr.write(traceback.format_exc())
+        return told
+    try:
+        with tempfile.NamedTemporaryFile("w", prefix="modeshape-", suffix=".txt", delete=False, errors="replace") as file:
+            file.write(f"modeshape {sys.argv[1:]}\n\n{traceback.format_exc()}")
+    except OSError:
+        return f"{told}; --verbose shows where"
+    return f"{told}; where it happened is in {file.name}"
+
+
+def fail(text: str, code: ExitCode = ExitCode.BAD_INPUT) -> NoReturn:
+    """One line on stderr, and the end."""
+    sys.stderr.write(f"error: {' '.join(text.splitlines())}\n")
+    sys.exit(code)

@@ -15,6 +15,7 @@ from app.options.pick import FramePicture, Pick
 from app.picking.pictures import Pictures
 from app.picking.region import Picked
 from app.picking.server import About, Picking
+from app.terminal.arguments import words_of
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary
 from tracking.video import Video
@@ -58,7 +59,7 @@ def pick(command: Pick, progress: Progress) -> Summary:
     Raises:
         UsageError, TrackingError: a source that cannot be read, or what stands in the way of the run.
     """
-    more = shlex.split(command.options)
+    more = words_of("--options", command.options)
 
     def words(found: Picked) -> str:
         return shlex.join(["modeshape", "run", command.source, *found.options, *more])

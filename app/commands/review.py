@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
 from app.files.writing import check_outputs, writable
@@ -15,6 +14,7 @@ from app.playback.facts import Facts, facts
 from app.playback.measures import Reviewed, per_frame, reviewed
 from app.playback.playback import Playback
 from app.terminal.progress import Progress
+from app.terminal.streams import Tables
 from app.terminal.summary import Summary
 
 # Parts of the configuration that have a row of their own, or say nothing about the result.
@@ -45,7 +45,7 @@ class Comparison(Summary):
             cells = [column.get(name, "") for column in columns]
             if any(cells):
                 table.add_row(name, *cells)
-        Console().print(table, highlight=False)
+        Tables().print(table)
 
 
 def review(command: Review, progress: Progress) -> Comparison:

@@ -51,7 +51,7 @@ class StoredTracks:
 
     def __iter__(self) -> Iterator[StoredFrame]:
         self._file.seek(0)
-        while data := self._file.read(self._row.itemsize):
+        while len(data := self._file.read(self._row.itemsize)) == self._row.itemsize:  # a full disk may cut off the last
             row = np.frombuffer(data, self._row)[0]
             observation = Observation(row["points"]["px"].copy(), row["points"]["visible"].copy())
             yield StoredFrame(int(row["index"]), float(row["time_s"]), observation, bool(row["lost"]))

@@ -1,15 +1,20 @@
 """Writing files and folders: checked before the work, and under their names only when complete."""
 
 import json
+import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from secrets import token_hex
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import BinaryIO
 
+from app.files.locks import check_unlocked
+from app.files.names import free
 from app.terminal.errors import UsageError
+
+PROMISED: set[Path] = set()  # names that were free when a command began: what is there later is somebody's
 
 
 def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | str | None], *, overwrite: bool) -> None:
@@ -23,18 +28,23 @@ def check_outputs(outputs: Mapping[str, Path | None], inputs: Iterable[Path | st
     Raises:
         UsageError: as of `check_free`, or two are the same.
     """
-    read = {Path(one).resolve() for one in inputs if one is not None and Path(one).is_file()}
-    written: dict[Path, str] = {}
+    read = {identity(Path(one)) for one in inputs if one is not None and Path(one).is_file()}
+    written: dict[object, str] = {}
     for option, path in outputs.items():
         if path is None:
             continue
-        place = path.resolve()
+        check_free(path, overwrite=overwrite)
+        place = identity(path)
         if place in read:
             raise UsageError(f"{option} {path} is read from: choose another name")
         if place in written:
             raise UsageError(f"{written[place]} and {option} are the same file {path}: choose another name for one")
         written[place] = option
-        check_free(path, overwrite=overwrite)
+
+
+def identity(path: Path) -> object:
+    """What is equal for two names of one file, links among them."""
+    return (path.stat().st_dev, path.stat().st_ino) if path.exists() else path.resolve()
 
 
 def check_free(path: Path | None, *, overwrite: bool) -> None:
@@ -45,18 +55,22 @@ def check_free(path: Path | None, *, overwrite: bool) -> None:
     """
     if path is None:
         return
-    if path.exists() and not path.is_file():
-        raise UsageError(f"{path} is {'a folder' if path.is_dir() else 'no regular file'}: choose another name")
-    if path.exists() and not overwrite:
-        raise UsageError(f"{path} exists: replace it with --overwrite, or choose another name")
     try:
+        if path.exists() and not path.is_file():
+            raise UsageError(f"{path} is {'a folder' if path.is_dir() else 'no regular file'}: choose another name")
+        if path.exists() and not overwrite:
+            raise UsageError(f"{path} exists: replace it with --overwrite, or choose another name")
+        if path.exists():
+            check_unlocked(path)
         path.parent.mkdir(parents=True, exist_ok=True)
-        new = not path.exists()
-        path.open("ab").close()
-        if new:
-            path.unlink()
+        with TemporaryFile(dir=path.parent):  # the name itself may be somebody's by now
+            pass
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror}; choose another place") from error
+    if overwrite:
+        PROMISED.discard(path.resolve())
+    else:
+        PROMISED.add(path.resolve())
 
 
 def check_free_folder(folder: Path, *, overwrite: bool) -> None:
@@ -82,6 +96,27 @@ def unfinished(path: Path) -> Path:
     return path.with_name(f".{token_hex(8)}.part{path.suffix}")
 
 
+def place(part: Path, path: Path, *, overwrite: bool) -> None:
+    """Give a file its name.
+
+    Raises:
+        UsageError: somebody took it meanwhile; the file is beside it.
+    """
+    if overwrite:
+        part.replace(path)
+        return
+    try:
+        os.link(part, path)  # unlike a renaming, replaces nothing
+    except FileExistsError:
+        other = free(path)
+        part.replace(other)
+        raise UsageError(f"{path} was written by somebody meanwhile: the result is in {other}") from None
+    except OSError:  # no links on this file system
+        part.replace(free(path))
+    else:
+        part.unlink()
+
+
 @contextmanager
 def moved_when_complete(path: Path) -> Iterator[Path]:
     """A path beside a file's, with the same ending, to write it to; the file is moved to its place if nothing fails.
@@ -93,7 +128,7 @@ def moved_when_complete(path: Path) -> Iterator[Path]:
     try:
         part.open("x").close()
         yield part
-        part.replace(path)
+        place(part, path, overwrite=path.resolve() not in PROMISED)
     except OSError as error:
         raise unwritable(path, error) from error
     finally:

@@ -7,6 +7,7 @@ from typing import cast
 import numpy as np
 
 from app.arrays import Array
+from app.files.writing import check_outputs
 from app.options.model import Model
 from app.options.run import Run
 from app.pipeline.stages.tracking import RECOVERED
@@ -14,6 +15,14 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.mapper import LATENCY, Mapper, Start
 from reconstruction.online import Reconstruction
 from reconstruction.settings import RecoveredRestShape, Settings
+
+
+def check_files(config: Run) -> None:
+    """Raise a UsageError if what is to be written cannot be, is something else, or is read."""
+    output = config.output
+    outputs = {"--out": output.out, "--tracks-out": output.tracks_out, "--shapes-out": output.shapes_out}
+    inputs = (config.source, config.mask, config.texture, config.ground_truth, config.rest_shape)
+    check_outputs(outputs, inputs, overwrite=output.overwrite)
 
 
 def estimator(config: Run, size: tuple[int, int], points_px: Array, start: Start, frames: int | None) -> Reconstruction:

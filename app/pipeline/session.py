@@ -10,10 +10,10 @@ from typing import Literal
 from threadpoolctl import threadpool_limits
 
 from app.files.names import RECORDINGS, free_name
-from app.files.writing import check_outputs
 from app.options.run import Run
 from app.pipeline.final_pass import final_pass
 from app.pipeline.parts import Parts
+from app.pipeline.prepare import check_files
 from app.pipeline.processed import InOrder, Processed, Surface
 from app.pipeline.stages.launched import Launched
 from app.pipeline.stages.stages import Stages
@@ -23,10 +23,9 @@ from app.pipeline.successor import Successor, options_for_another
 from app.pipeline.summary import Counts, RunSummary, summary_of
 from app.pipeline.tracked_object import FrameShape, TrackedObject
 from app.terminal.errors import UsageError, in_a_line
-from app.terminal.interrupts import completed
+from app.terminal.interrupts import completed, undisturbed
 from app.terminal.progress import Progress
 from reconstruction import ReconstructionError
-from tracking import TrackingError
 from tracking.guarded import Change, Guarded
 from tracking.video import Frame
 
@@ -44,7 +43,7 @@ class Session:
         fps: announced rate of the video, once the frames have begun.
         recordings: the files written so far.
         interrupted: whether the run ends early; whoever sets it ends the run with the next frame.
-        summary: once the frames have ended: counts of the whole run, and what came out for the first object.
+        summary: once the frames have ended: counts of the whole run, and what came of the first object.
 
     Raises:
         UsageError, TrackingError: a file or option that cannot be used.
@@ -55,15 +54,11 @@ class Session:
     def __init__(self, config: Run, progress: Progress, *, record: bool = True, launched: Launched | None = None) -> None:
         self._launched = launched
         self._config, self._progress, self._record_unnamed = config, progress, record
-        output = config.output
-        outputs = {"--out": output.out, "--tracks-out": output.tracks_out, "--shapes-out": output.shapes_out}
-        inputs = (config.source, config.mask, config.texture, config.ground_truth, config.rest_shape)
-        check_outputs(outputs, inputs, overwrite=output.overwrite)
+        check_files(config)
         self._watch, self._counts, self._order = Stopwatch(), Counts(), InOrder()
         self._surface: Surface | None = None
         self._successor: Successor | None = None
-        self.recordings: list[Path] = []
-        self.fps, self.interrupted = 0.0, False
+        self.recordings, self.fps, self.interrupted = list[Path](), 0.0, False
 
     def run(self) -> RunSummary:
         """Process the whole source; an interrupt ends it early, with all so far kept. Raises what `frames` raises."""
@@ -121,7 +116,9 @@ class Session:
                     break
         except KeyboardInterrupt:
             self.interrupted = True
-        except (GeneratorExit, UsageError, TrackingError):  # nobody wants more; the source or a stage has ended
+        except ReconstructionError:
+            raise
+        except BaseException:  # nobody wants more; the source or a stage has ended, a disk is full, or it is our mistake
             self.interrupted = True
             self._end_object(last=True)
             raise
@@ -196,9 +193,11 @@ class Session:
             ReconstructionError: the last object has too few frames for a rest shape, and nobody interrupted it.
             UsageError: a stage has ended; all that is known is saved before.
         """
-        failed: UsageError | None = None
         try:
-            self._record(self._object.finish())
+            with completed():
+                self._record(self._object.finish())
+        except KeyboardInterrupt:
+            self.interrupted = True
         except (ReconstructionError, UsageError) as error:
             if last and not self.interrupted:
                 raise
@@ -206,20 +205,21 @@ class Session:
         if last:
             self._order.end(self._surface)
             self._watch.stop()
-        if self._wanted_again and not self.interrupted:
-            try:
+        try:
+            if self._wanted_again and not self.interrupted:
                 self.interrupted = final_pass(self._object, self._recording, self._progress)
-            except UsageError as error:
-                failed = error
-        if last:
-            self.summary = self._summary(self._first_object)
+        finally:
+            with undisturbed():
+                self._save()
+
+    def _save(self) -> None:
+        """Record the summary of what is known, and write the files asked for."""
+        self.summary = self._summary(self._first_object)
         self._recording.tell("summary", self._summary(self._object).as_dict())
         if self._surface is not None:
             self._recording.tell("modes", *self._object.surface.recorded[:2])
             self._recording.tell("truth", self._object.true_shapes())
         self._object.save()
-        if failed is not None:
-            raise failed
 
     def _begin_another(self, frame: Seen) -> None:
         """From this frame on the successor is followed, in a recording of its own."""

@@ -1,5 +1,6 @@
 """What came out of a run, for people and programs, and what is counted on the way."""
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -151,7 +152,7 @@ class RunSummary(Summary):
     @property
     def hint(self) -> str:
         """How to look at the recording."""
-        return f"look at it with: rerun {self.recording}" if self.recording else ""
+        return f"look at it with: rerun {shlex.quote(str(self.recording))}" if self.recording else ""
 
     @property
     def exit_code(self) -> ExitCode:

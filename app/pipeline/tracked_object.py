@@ -1,6 +1,7 @@
 """One object of a run: its points, who makes shapes of them, and what is kept of it."""
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -208,21 +209,24 @@ class TrackedObject:
         Raises:
             UsageError: one cannot be written.
         """
-        output = self.config.output
-        if output.tracks_out and self._stored is not None:
-            tracks = [stored.observation for stored in self._stored]
-            W, visible = np.stack([o.points_px.T for o in tracks]), np.stack([o.visible for o in tracks])
-            camera = self.reconstruction.camera
-            with writable(output.tracks_out) as file:
-                Tracks(W, visible, K=camera.K if camera.perspective else None).save(file)
-        if output.shapes_out and self.collected.estimates:
-            save_shapes(
-                output.shapes_out,
-                self.collected.estimates,
-                self.reconstruction.model,
-                self.collected.lost,
-                self.mm_per_px or 1.0,
-            )
+        with ExitStack() as both:  # one that cannot be written does not keep the other from being
+            both.callback(self._save_shapes)
+            both.callback(self._save_tracks)
+
+    def _save_tracks(self) -> None:
+        path = self.config.output.tracks_out
+        if not path or self._stored is None:
+            return
+        tracks = [stored.observation for stored in self._stored]
+        W, visible = np.stack([o.points_px.T for o in tracks]), np.stack([o.visible for o in tracks])
+        camera = self.reconstruction.camera
+        with writable(path) as file:
+            Tracks(W, visible, K=camera.K if camera.perspective else None).save(file)
+
+    def _save_shapes(self) -> None:
+        path, collected = self.config.output.shapes_out, self.collected
+        if path and collected.estimates:
+            save_shapes(path, collected.estimates, self.reconstruction.model, collected.lost, self.mm_per_px or 1.0)
 
     def _nothing(self) -> Collected:
         """No estimates yet."""

@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import signal
 import subprocess
 from dataclasses import replace
 from multiprocessing.connection import Connection
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from app.recording.recording import Recording
 
 MOST_WAITING = 64  # calls, some ten frames: then the run waits for the disk
+HANGS_S = 60  # a call that takes longer will not end: Rerun waits for disks that are full
 
 NO_PICTURE = np.empty((0, 0, 3), np.uint8)
 
@@ -222,7 +224,10 @@ def main() -> None:
         size = connection.recv()
         pictures = Ring(inherited_file(2), size) if size else None
         while method != "leave":
-            method, arguments, named, number = cast(Call, pickle.loads(connection.recv_bytes()))
+            signal.alarm(0)
+            data = connection.recv_bytes()
+            method, arguments, named, number = cast(Call, pickle.loads(data))
+            signal.alarm(0 if method == "leave" else HANGS_S)  # ends the process; completing may take longer
             if pictures is not None and number is not None:
                 arguments = (replace(arguments[0], image=pictures.picture(number)), *arguments[1:])
             try:

@@ -211,8 +211,8 @@ class Recording:
         """What came out of the run."""
         self._stream.document(entities.SUMMARY, "Summary", values)
 
-    def close(self) -> None:
-        """Complete the file; one without a frame is removed, so as not to be in the way of the next run.
+    def close(self, *, keep: bool = True) -> None:
+        """Complete the file; one without a frame, or that is not kept, is removed: it would be in the way of the next run.
 
         Raises:
             UsageError: it could not be written.
@@ -223,9 +223,7 @@ class Recording:
                     draw(self._stream, shape)
         finally:
             self._undrawn = {}
-            self._stream.close()
-        if self.path is not None and self._frames == 0:
-            self.path.unlink(missing_ok=True)
+            self._stream.close(keep=keep and self._frames > 0)
 
     def __enter__(self) -> Self:
         return self
@@ -243,8 +241,4 @@ class Recording:
         Raises:
             UsageError: it could not be written.
         """
-        try:
-            self.close()
-        finally:
-            if failed and not self._placed and self.path is not None:
-                self.path.unlink(missing_ok=True)
+        self.close(keep=self._placed or not failed)

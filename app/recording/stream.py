@@ -1,5 +1,6 @@
 """The channel a recording is written through: Rerun's stream to a file, to viewers, to both or to nothing."""
 
+import atexit
 import json
 import operator
 import shutil
@@ -7,12 +8,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
-from threading import Thread
+from threading import Event, Thread
 
 import numpy as np
 import rerun as rr
 
 from app.arrays import Array, Floats
+from app.files.growing import GrowingFile
 from app.recording import entities
 from app.recording.blueprint import blueprint
 from app.recording.columns import Columns, Kind, Values
@@ -21,7 +23,7 @@ from app.terminal.errors import UsageError
 FLUSH_SECONDS = 10.0  # a viewer that hangs must not stop a run
 BATCH_ROWS = 30  # written together: a killed recorder loses so many frames
 VIEWED_SENDS = 100  # between two looks at the disk with a viewer, where everything is sent by itself
-FULL_BYTES = 2**20  # so little left on a disk explains a failure
+FULL_BYTES = 8 * 2**20  # so little left on a disk is too little: Rerun waits for ever for what it could not write
 
 Loggable = rr.AsComponents | Iterable[rr.DescribedComponentBatch]
 
@@ -36,19 +38,23 @@ class Stream:
 
     def __init__(self, path: Path | None, urls: list[str]) -> None:
         self._path = path
+        self._file = GrowingFile(path) if path is not None else None
         self._columns, self._at = Columns(), (0, 0.0)
         # A viewer wants everything at once.
         self._batch, self._flushed_after = (1, VIEWED_SENDS) if urls else (BATCH_ROWS, 1)
         self._sends = 0
-        sinks: list[rr.FileSink | rr.GrpcSink] = [rr.GrpcSink(url) for url in dict.fromkeys(urls)]
-        if path is not None:
-            sinks.append(rr.FileSink(path))
-        self._stream = rr.RecordingStream(entities.APPLICATION) if sinks else None
-        if self._stream is None:
-            return
+        sinks: list[rr.GrpcSink | rr.FileSink] = [rr.GrpcSink(url) for url in dict.fromkeys(urls)]
         try:
+            if self._file is not None:
+                self._check_room()
+                sinks.append(rr.FileSink(self._file.path))
+            self._stream = rr.RecordingStream(entities.APPLICATION) if sinks else None
+            if self._stream is None:
+                return
             self._stream.set_sinks(*sinks, default_blueprint=blueprint(live=bool(urls)))
         except RuntimeError as error:
+            if self._file is not None:
+                self._file.close(keep=False)
             raise self._failure(error) from error
         self._stream.set_log_time_enabled(False)
         self._stream.set_log_tick_enabled(False)
@@ -73,10 +79,13 @@ class Stream:
         self._at = operator.index(index), float(time_s)
         yield
         if self._stream is not None and self._columns.rows >= self._batch:
-            self._send(self._stream)
             self._sends += 1
-            if self._sends % self._flushed_after == 0:  # a full disk is noticed
+            if self._sends % self._flushed_after:
+                self._send(self._stream)
+            else:  # a full disk is noticed
                 self._flush(self._stream)
+                if self._file is not None:
+                    self._file.show()
 
     def row(self, entity: str, kind: Kind, **values: Values) -> None:
         """Write a row, soon: components by name, made into columns by `kind`."""
@@ -113,37 +122,57 @@ class Stream:
         self.log(entity, rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN))
         self.values(entity, "Document", json=json.dumps(dict(values), default=str), version=release)
 
-    def close(self) -> None:
-        """Complete the file; without it, `rerun rrd verify` refuses it.
+    def close(self, *, keep: bool) -> None:
+        """Complete the file; without it, `rerun rrd verify` refuses it. One that is not kept is removed.
 
         Raises:
             UsageError: it could not be written.
         """
-        stream, self._stream = self._stream, None
-        if stream is None:
-            return
         try:
-            self._flush(stream)
-        except UsageError:
-            # Rerun may wait for ever for a file that it could not write.
-            Thread(target=stream.disconnect, daemon=True).start()
-            raise
-        stream.disconnect()
+            self._complete()
+            if keep and self._file is not None:
+                self._file.show()
+        finally:
+            if self._file is not None:
+                self._file.close(keep=keep)
+
+    def _complete(self) -> None:
+        if self._stream is not None:
+            self._flush(self._stream)
+        if self._stream is not None:
+            self._stream.disconnect()
+        self._stream = None
 
     def _send(self, stream: rr.RecordingStream) -> None:
+        self._check_room()
         for piece in self._columns.taken():
             rr.send_columns(piece.entity, piece.times, piece.columns, recording=stream)
 
     def _flush(self, stream: rr.RecordingStream) -> None:
         """Wait until everything is on its way to the disk; a viewer that was closed meanwhile is no failure."""
-        self._send(stream)
         try:
+            self._send(stream)
             stream.flush(timeout_sec=FLUSH_SECONDS)
         except RuntimeError as error:
-            if "gRPC" not in str(error):
-                raise self._failure(error) from error
+            if "gRPC" in str(error):
+                return
+            self._stream = None  # Rerun waits for ever for a file that it could not write
+            atexit.unregister(rr.rerun_shutdown)
+            Thread(target=given_up, args=(stream,), daemon=True).start()
+            raise self._failure(error) from error
+
+    def _check_room(self) -> None:
+        """Raises a RuntimeError if the disk is nearly full."""
+        if self._path is not None and shutil.disk_usage(self._path.parent).free < FULL_BYTES:
+            raise RuntimeError("the disk is full")
 
     def _failure(self, error: RuntimeError) -> UsageError:
         full = self._path is not None and shutil.disk_usage(self._path.parent).free < FULL_BYTES
         reason = "the disk is full" if full else str(error)
         return UsageError(f"cannot write {self._path}: {reason}; choose another place with --out")
+
+
+def given_up(stream: rr.RecordingStream) -> None:
+    """In a thread of its own: let go of a stream, whether that ever ends or not; it must not be tried again at the end."""
+    stream.disconnect()
+    Event().wait()

@@ -1,6 +1,7 @@
 """What a person types, before it is parsed: lists of numbers in any form, and what was meant by a name there is not."""
 
 import re
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -72,6 +73,18 @@ def spelled_out(arguments: Sequence[str]) -> list[str]:
             waiting.pop(0)
         lists += [name, *checked(name, given, waiting)]
     return rest + lists
+
+
+def words_of(name: str, options: str) -> list[str]:
+    """Options in one text, as a shell takes them apart.
+
+    Raises:
+        UsageError: a quote is open.
+    """
+    try:
+        return shlex.split(options)
+    except ValueError as error:
+        raise UsageError(f"{name}={options} ends too early ({str(error).lower()}): close the quotes") from error
 
 
 def numbers_in(text: str) -> list[str]:

@@ -9,4 +9,5 @@ class ExitCode(IntEnum):
     DONE = 0
     SOME_FAILED = 1
     BAD_INPUT = 2
+    OUR_MISTAKE = 70
     INTERRUPTED = 130

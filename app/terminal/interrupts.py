@@ -5,7 +5,21 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """The body, of a few seconds, is completed whatever comes; what came is left out."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = [(number, signal.signal(number, signal.SIG_IGN)) for number in SIGNALS]
+    try:
+        yield
+    finally:
+        for number, handler in before:
+            signal.signal(number, handler)
 
 
 @contextmanager
@@ -25,7 +39,8 @@ def completed() -> Iterator[None]:
             raise KeyboardInterrupt
         received.append(number)
 
-    before = [(number, signal.signal(number, receive)) for number in SIGNALS]
+    heard = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]  # as nohup does
+    before = [(number, signal.signal(number, receive)) for number in heard]
     try:
         yield
     finally:

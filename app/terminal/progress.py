@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Task, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bars
 
-stderr = Console(stderr=True)
+stderr = Console(stderr=True, markup=False, highlight=False)
 
 
 class FramesPerSecond(TextColumn):
@@ -26,7 +26,7 @@ class Progress:
 
     def __init__(self, what: str = "starting") -> None:
         self._bars = Bars(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=24),
             MofNCompleteColumn(),
             FramesPerSecond(),
@@ -60,4 +60,4 @@ class Progress:
 
     def log(self, text: str) -> None:
         """Print a line that stays."""
-        stderr.print(text, style="dim", highlight=False, soft_wrap=True)
+        stderr.print(text, style="dim", soft_wrap=True)

@@ -6,10 +6,10 @@ from dataclasses import MISSING, dataclass, fields
 from math import isfinite
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
 from app.terminal.exit_code import ExitCode
+from app.terminal.streams import Tables
 
 PERCENT = ("visible_share", "visible_share_last", "e3d", "e3d_camera", "e3d_static", "e3d_sign_free", "e3d_online")
 
@@ -70,12 +70,12 @@ def print_rows(words: Mapping[str, object]) -> None:
     for name, value in words.items():
         if value is not None:
             table.add_row(name, in_words(name, value))
-    Console().print(table)
+    Tables().print(table)
 
 
 def print_lines(headline: str, rows: Mapping[str, object]) -> None:
     """A line, and names and values under it, on stdout."""
-    Console().print(headline, highlight=False, markup=False)
+    Tables().print(headline)
     print_rows(rows)
 
 

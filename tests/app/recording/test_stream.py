@@ -59,7 +59,7 @@ def test_an_interrupted_run_is_kept_without_a_shape(tmp_path: Path) -> None:
 def test_a_run_without_a_frame_leaves_no_file(tmp_path: Path) -> None:
     path = tmp_path / "new" / "empty.rrd"
     with record(path):
-        assert path.exists()
+        assert not path.exists()
     assert not path.exists()
 
 
@@ -79,9 +79,11 @@ def test_an_unwritable_place_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
-def test_a_full_disk_is_an_error() -> None:
-    with pytest.raises(UsageError, match="cannot write /dev/full"):
-        Stream(Path("/dev/full"), [])
+def test_a_full_disk_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.recording.stream.FULL_BYTES", 2**60)
+    with pytest.raises(UsageError, match=r"cannot write .* the disk is full"):
+        Stream(tmp_path / "run.rrd", [])
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_without_file_and_viewer_nothing_happens() -> None:
