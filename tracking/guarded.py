@@ -21,6 +21,10 @@ MIN_POINTS = 12  # fewer, and it is lost, too
 FOUND_SHARE = 0.2  # share of the points that must look right to believe that the surface is back
 SEARCH_EVERY_FRAME = 15  # so many frames it is searched for in each frame; later, to save time, ...
 SEARCH_EVERY = 5  # ... in one out of so many
+PARTLY = 0.75  # share of the points: while fewer are seen, the others are looked for by their features, too, ...
+REGAIN_EVERY, REGAIN_SELDOM = 8, 32  # ... in one out of so many frames, less and less often while that brings ...
+REGAINED = 0.02  # ... less than this share
+REGAIN_SIDE_PX = 480  # of the picture for that: it must not take long
 SAME_SHARE = 0.75  # of the share seen before: so many at the same place need no search
 
 
@@ -76,6 +80,7 @@ class GuardedTracker:
         self._tracker = PointTracker(image_bgr, points_px)
         self._left_behind = LeftBehind(points_px)
         self._relocalisation: Relocalisation | None = None
+        self._regain_every, self._partly = REGAIN_EVERY, 0  # frames; of them those in which it is seen only partly
         self._shares = deque([1.0], RECENT_FRAMES)  # of the points seen in the last frames
         self._last_px = points_px.copy()  # where the surface was last: seen or predicted
         self.lost = False
@@ -85,7 +90,7 @@ class GuardedTracker:
         """Find the points in the next frame; `predicted_px` (P, 2) as for `PointTracker.track`."""
         if self.lost:
             return self._search(image_bgr)
-        observation = self._tracker.track(image_bgr, predicted_px)
+        observation = self._regained(self._tracker.track(image_bgr, predicted_px), image_bgr)
         share = self._share(observation)
         just_now = max(self._shares)
         jumped = share < COLLAPSED_SHARE * just_now and share < FEW_SHARE
@@ -112,9 +117,7 @@ class GuardedTracker:
         if self._good(found, SAME_SHARE * max(self._shares)) or not self._due:
             enough = self._good(found, FOUND_SHARE)
         else:
-            if self._relocalisation is None:
-                self._relocalisation = Relocalisation(self._reference, self._points)
-            places = self._relocalisation.find(image_bgr)
+            places = self._features.find(image_bgr)
             if places is not None:
                 relocated = self._tracker.resume(image_bgr, places)
                 if relocated.visible.sum() > found.visible.sum():
@@ -132,6 +135,28 @@ class GuardedTracker:
         self._last_px = np.where(found.visible[:, None], found.points_px, self._last_px)
         lasted = f"after {frames} frame{'s' if frames > 1 else ''}"
         return Guarded(found, Change.RECOVERED, f"found {how}, {share:.0%} of the points, {lasted}")
+
+    def _regained(self, observation: Observation, image_bgr: Image) -> Observation:
+        """With points that have come into sight far from where they were expected, if it is time to look for them."""
+        share = self._share(observation)
+        self._partly = self._partly + 1 if LOST_SHARE < share < PARTLY else 0
+        if not self._partly:
+            self._regain_every = REGAIN_EVERY
+        if self._partly < self._regain_every:
+            return observation
+        self._partly = 0
+        places = self._features.find(image_bgr, REGAIN_SIDE_PX)
+        regained = observation if places is None else self._tracker.regain(places)
+        worth = self._share(regained) > share + REGAINED
+        self._regain_every = REGAIN_EVERY if worth else min(2 * self._regain_every, REGAIN_SELDOM)
+        return regained
+
+    @property
+    def _features(self) -> Relocalisation:
+        """Finds the surface by its features; made when it is needed."""
+        if self._relocalisation is None:
+            self._relocalisation = Relocalisation(self._reference, self._points)
+        return self._relocalisation
 
     @property
     def _due(self) -> bool:

@@ -91,8 +91,17 @@ class PointTracker:
             expected_px: (P, 2) where the points are, to some pixels; NaN where that is not known.
         """
         self._grays = Grays.of(image_bgr)
+        self._points = np.full_like(self._reference, np.nan)
+        return self.regain(expected_px)
+
+    def regain(self, expected_px: Array) -> Observation:
+        """Find those points that the last frame does not show yet from rough places alone.
+
+        Args:
+            expected_px: (P, 2) where the points are, to some pixels; NaN where that is not known.
+        """
         fine, coarse = _pictures(self._grays)
-        points = np.full_like(self._reference, np.nan)
+        points = self._points
         for _ in range(RESUME_ROUNDS):  # what is found tells better where the others are
             sought = np.where(np.isfinite(points), points, expected_px + self._miss(points, expected_px))
             motion = self._motion(sought, None)

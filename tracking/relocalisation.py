@@ -34,11 +34,16 @@ class Relocalisation:
         mask = np.zeros(image_bgr.shape[:2], np.uint8)
         hull = cv2.convexHull(points_px.astype(np.float32).reshape(-1, 1, 2))
         cv2.fillConvexPoly(mask, np.rint(hull).astype(np.int32), (255,))
-        self._places, self._described = self._features(image_bgr, cv2.SIFT.create(FEATURES), mask)
+        self._places, self._described = self._features(image_bgr, cv2.SIFT.create(FEATURES), mask, SIDE_PX)
 
-    def find(self, image_bgr: Image) -> Array | None:
-        """Where the points are in a picture, to some pixels: (P, 2), NaN where no match is near; None if nowhere."""
-        places, described = self._features(image_bgr, self._sift, None)
+    def find(self, image_bgr: Image, side_px: int = SIDE_PX) -> Array | None:
+        """Where the points are in a picture, to some pixels: (P, 2), NaN where no match is near; None if nowhere.
+
+        Args:
+            image_bgr: (H, W, 3) uint8.
+            side_px: larger pictures are made smaller: to save time.
+        """
+        places, described = self._features(image_bgr, self._sift, None, side_px)
         if len(places) < MIN_MATCHES or len(self._places) < MIN_MATCHES:
             return None
         matches = cv2.BFMatcher(cv2.NORM_L2).knnMatch(self._described, described, k=2)
@@ -78,9 +83,9 @@ class Relocalisation:
         total = w.sum(axis=1)
         return w @ off / np.maximum(total, 1e-12)[:, None], total
 
-    def _features(self, image_bgr: Image, sift: cv2.SIFT, mask: Image | None) -> tuple[Array, Floats]:
+    def _features(self, image_bgr: Image, sift: cv2.SIFT, mask: Image | None, side_px: int) -> tuple[Array, Floats]:
         gray = cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)
-        scale = min(1.0, SIDE_PX / max(gray.shape))
+        scale = min(1.0, side_px / max(gray.shape))
         if scale < 1.0:
             gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
             mask = None if mask is None else cast(Image, cv2.resize(mask, gray.shape[::-1]))
