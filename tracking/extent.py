@@ -6,7 +6,7 @@ from tracking import Array, Flags, TrackingError
 
 FEWEST = 4  # points in a frame: fewer have no shape
 LARGEST = 1e100  # beyond, squares overflow
-ON_A_LINE = 1e-6  # of the points' length: so thin they are a line
+ON_A_LINE = 5e-3  # of the points' length: what is so thin shows nothing of its depth
 LOOKED_AT = 50  # frames
 
 

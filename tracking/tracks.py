@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tracking import Array, Flags, Indices, TrackingError
 from tracking.extent import check_extent
 
+LARGEST_BYTES = 4 * 2**30  # of arrays in a file
 SKEW = 1e-3  # of the focal length: more is no ordinary camera
 
 
@@ -59,7 +60,7 @@ class Tracks:
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """Read an .npz file: `W` and optionally `visible` (absent: all), `K`, `S_gt`, `gt_frames`.
+        """Read an .npz file: `W` and optionally `visible` (absent: all), `K`, `S_gt`, `gt_frames`; pixels become square.
 
         Raises:
             TrackingError: the file is missing, is no .npz, lacks `W`, or its arrays do not fit.
@@ -78,9 +79,18 @@ class Tracks:
             given = {name: _numbers(name, arrays) for name in ("K", "S_gt") if name in arrays}
             tracks = cls(W, visible, given.get("K"), given.get("S_gt"), _frame_numbers(arrays))
             check_extent(tracks.W, tracks.visible)
-            return tracks
+            return tracks.with_square_pixels()
         except TrackingError as error:
             raise TrackingError(f"{path}: {error}") from None
+
+    def with_square_pixels(self) -> Self:
+        """The same with both focal lengths of K equal: y as long as x."""
+        if self.K is None or self.K[0, 0] == self.K[1, 1]:
+            return self
+        W, K = self.W.copy(), self.K.copy()
+        W[:, 1] = K[1, 2] + K[0, 0] / K[1, 1] * (W[:, 1] - K[1, 2])
+        K[1, 1] = K[0, 0]
+        return replace(self, W=W, K=K)
 
     def of_points(self, kept: Flags) -> Self:
         """The same of some of the points (P,) alone."""
@@ -152,8 +162,16 @@ def _read_npz(path: Path) -> dict[str, NDArray[Any]]:
     try:
         if not zipfile.is_zipfile(path):
             raise TrackingError(f"{path} is not an .npz file; write it with numpy.savez")
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > LARGEST_BYTES:
+            raise TrackingError(f"{path} unpacks to {size / 2**30:.0f} GB; at most {LARGEST_BYTES / 2**30:.0f} are read")
         with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+            found = {name: file[name] for name in file.files}
+        strange = [name for name, value in found.items() if not isinstance(value, np.ndarray)]
+        if strange:
+            raise TrackingError(f"{path} holds {strange[0]}, which is no array: write it with numpy.savez")
+        return found
     except TrackingError:
         raise
     except Exception as error:  # damaged archives raise a dozen different things, MemoryError among them

@@ -30,6 +30,8 @@ from reconstruction.online import Reconstruction
 from tracking.tracks import Tracks
 
 FEWEST_FRAMES = 2  # that a point is seen in: one has no depth
+MOST_POINTS = 100_000  # take 2 GB
+MOST_VALUES = 100_000_000  # points in all frames
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,12 +84,18 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
     check_outputs({"--shapes-out": config.shapes_out}, (config.tracks, config.rest_shape), overwrite=config.overwrite)
     tracks = Tracks.load(config.tracks)
     frames, _, points = tracks.W.shape
+    for most, of, what in ((MOST_POINTS, points, "points"), (MOST_VALUES, frames * points, "points in all frames")):
+        if of > most:
+            step = -(-of // most)
+            raise UsageError(f"{config.tracks} has {of:,} {what}, at most {most:,} are possible: take one of {step}")
     rng = np.random.default_rng(config.seed)
     W = with_noise(np.where(tracks.visible[:, None], tracks.W, np.nan), config.noise, rng)
     visible = with_missing(tracks.visible, config.missing, rng)
     if config.outliers:
         W = with_outliers(W, tracks.visible, config.outliers, rng)
     kept = visible.sum(axis=0) >= FEWEST_FRAMES
+    if not kept.any():
+        raise UsageError(f"{config.tracks} shows no point in {FEWEST_FRAMES} frames: there is nothing to reconstruct")
     if config.rest_shape in RECOVERED and not kept.all():  # nobody knows where the others are
         tracks = tracks.of_points(kept)
         W, visible = W[:, :, kept], visible[:, kept]

@@ -161,3 +161,13 @@ def test_shared_files_load(shared_data: Path) -> None:
     for name, shape in (("flag250", (30, 2, 250)), ("flag250_perspective", (30, 2, 250)), ("face37", (74, 2, 37))):
         assert Tracks.load(shared_data / f"{name}.npz").W.shape == shape
         assert Truth.load(shared_data / f"{name}.npz").W_px.shape[2] == shape[2]
+
+
+def test_pixels_that_are_not_square_become_square(tmp_path: Path) -> None:
+    high = K * [[1.0], [1.5], [1.0]]
+    stretched = W.copy()
+    stretched[:, 1] = high[1, 2] + 1.5 * (W[:, 1] - K[1, 2])
+    tracks = Tracks.load(write(tmp_path, W=stretched, K=high))
+    assert tracks.K is not None
+    np.testing.assert_allclose(tracks.W[:, 1] - tracks.K[1, 2], W[:, 1] - K[1, 2], atol=1e-9)
+    assert tracks.K[0, 0] == tracks.K[1, 1] == K[0, 0]

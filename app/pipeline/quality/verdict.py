@@ -39,7 +39,7 @@ class Course:
 
     Attributes:
         frames: of the source.
-        errors: median residual over the RMS radius of the image.
+        errors: median residual over the RMS radius of the image; NaN where nothing is seen.
         errors_px: median residual.
         shares: of the points seen.
         lost: frames without the object.
@@ -54,7 +54,7 @@ class Course:
     def add(self, frame: int, estimate: ShapeEstimate) -> None:
         """Add the estimate of a source frame."""
         seen = estimate.residual_px[estimate.visible]
-        error_px = float(np.median(seen)) if len(seen) else np.inf
+        error_px = float(np.median(seen)) if len(seen) else np.nan
         radius_px = float(np.sqrt(np.var(estimate.projection_px, axis=0).sum()))
         self.frames.append(frame)
         self.errors.append(error_px / max(radius_px, 1e-12))
@@ -82,7 +82,7 @@ def verdict(course: Course, found: Map | None) -> Verdict:
         course: what each frame tells.
         found: what the object is taken for; None if there is no model.
     """
-    if found is None or not course.frames:
+    if found is None or np.isnan(np.asarray(course.errors)).all():
         return Verdict("poor", "there is no shape; the video is too short, or the surface has too little texture")
     findings = [*errors(course, found), *seen(course)]
     findings += evidence(course, found, known=bool(findings))
@@ -99,7 +99,7 @@ def limits(poor: float, fair: float) -> list[tuple[Grade, float]]:
 def praise(course: Course, found: Map) -> str:
     """Why it is good."""
     kind = {"isometric": "a sheet", "rigid": "a solid"}.get(found.rest.kind, "as given")
-    return f"{np.median(course.errors_px):.2g} px, {np.mean(course.shares):.0%} of the points seen, {kind} in many views"
+    return f"{np.nanmedian(course.errors_px):.2g} px, {np.mean(course.shares):.0%} of the points seen, {kind} in many views"
 
 
 def errors(course: Course, found: Map) -> Iterator[Verdict]:
@@ -108,7 +108,7 @@ def errors(course: Course, found: Map) -> Iterator[Verdict]:
     guessed = found.evidence is None and found.rest.kind in RECOVERED
     for grade, limit in limits(POOR_GUESS if guessed else POOR_ERROR, FAIR_ERROR):
         bad = np.asarray(off > limit)
-        if np.median(off) > limit or longest(bad)[1] >= LASTING * len(off):
+        if np.nanmedian(off) > limit or longest(bad)[1] >= LASTING * len(off):
             yield Verdict(grade, f"{where(course, bad)}; {remedy(found)}")
             return
 
@@ -171,7 +171,7 @@ def evidence(course: Course, found: Map, *, known: bool) -> Iterator[Verdict]:
                 "only the first frames say what it is, depth may be a guess; film it turning or bending more, from near by",
             )
         return
-    usual = float(np.median(np.asarray(course.errors)))
+    usual = float(np.nanmedian(np.asarray(course.errors)))
     if found.sheet is not None and found.sheet.strain_rms > FAIR_STRAIN * usual:
         told = f"its lengths change by {found.sheet.strain_rms:.1%}, more than noise explains: it stretches, or has creases"
         yield Verdict("fair", told)

@@ -1,5 +1,6 @@
 """What can go wrong: one line that names the thing, exit code 2, nothing overwritten, nothing left behind."""
 
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -117,6 +118,12 @@ EVALUATIONS = [
     ("late.npz", ["late.npz", "gt_frames goes to 50"]),
     ("camera.npz", ["camera.npz", "K is no camera matrix"]),
     ("blind.npz --rest-shape plane", ["4 points"]),
+    ("one.npz", ["one.npz shows no point in 2 frames"]),
+    ("line.npz", ["line.npz", "the points lie on one line"]),
+    ("huge.npz", ["huge.npz", "values beyond 1e+100"]),
+    ("many.npz", ["many.npz has 100,001 points, at most 100,000 are possible: take one of 2"]),
+    ("notes.npz", ["notes.npz holds W, which is no array"]),
+    ("bomb.npz", ["bomb.npz unpacks to 5 GB; at most 4"]),
     ("still.npz --rest-shape rigid", ["turned 0.0° in 12 frames, about 10° are needed"]),
     ("tracks.npz --rest-shape first-truth", ["tracks.npz has no true shapes S_gt"]),
     ("tracks.npz --rest-shape far.obj", ["far.obj does not fit", "4 vertices", "40 points"]),
@@ -155,6 +162,16 @@ def files(here: Path) -> Path:
     np.savez(here / "camera.npz", W=W, K=np.zeros((3, 3)))
     np.savez(here / "blind.npz", W=W, visible=blind)
     np.savez(here / "still.npz", W=np.broadcast_to(W[:1], W.shape))
+    np.savez(here / "one.npz", W=W[:1])
+    line = np.linspace(0, 300, POINTS) * np.linspace(1, 1.2, 12)[:, None]
+    np.savez(here / "line.npz", W=np.stack([line, line / 2], axis=1) + 0.1 * rng.normal(size=W.shape))
+    np.savez(here / "huge.npz", W=1e300 * W)
+    np.savez(here / "many.npz", W=rng.normal(size=(2, 2, 100_001)))
+    with zipfile.ZipFile(here / "notes.npz", "w") as archive:
+        archive.writestr("W.npy", b"not an array")
+    with zipfile.ZipFile(here / "bomb.npz", "w") as archive:
+        archive.writestr("W.npy", b"")
+        archive.infolist()[0].file_size = 5 * 2**30
     cv2.imwrite(str(here / "small.png"), np.full((100, 100), 255, np.uint8))
     cv2.imwrite(str(here / "black.png"), np.zeros((240, 320), np.uint8))
     (here / "text.obj").write_text("not a mesh")
