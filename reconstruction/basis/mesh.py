@@ -47,9 +47,7 @@ def triangulate(points: Array) -> Mesh:
     try:
         triangulation = Delaunay(points)
     except QhullError as error:
-        raise ReconstructionError("cannot make a mesh: the points lie on one line, or move at random; track a wider region") from error
-            "cannot make a mesh: the shape at rest is a line or a point; track a wider region, of one surface"
-        ) from error
+        raise ReconstructionError("cannot make a mesh: the points lie on one line, or move at random") from error
     faces = triangulation.simplices.astype(np.int64)
     on_hull = (triangulation.neighbors < 0).any(axis=1)
     kept = faces[~(on_hull & (smallest_angle(points, faces) < np.deg2rad(SLIVER_DEGREES)))]
