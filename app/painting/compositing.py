@@ -7,8 +7,9 @@ import cv2
 import numpy as np
 
 from app.arrays import Array, Floats, Image, Mask
-from app.painting import shading
-from app.painting.occlusion import occlusion_mask
+from app.painting import edge, shading
+from app.painting.evidence import Moved
+from app.painting.occlusion import Occlusion, Tracked
 from app.painting.picture import Pyramid
 from app.painting.placement import Placement, extent
 from app.painting.raster import Rasteriser, SurfaceMap
@@ -19,7 +20,7 @@ from reconstruction.basis.model import Model
 
 PAPER = 0.95  # of a picture's full white is what bare paper shows
 EDGE_PX = 0.7  # of the surface where its outline is not straight
-FEATHER_PX = 0.6  # half-resolution px, of the mask
+AROUND = 6  # half-resolution px around what is in front that are looked at for its edge
 
 
 class Compositor:
@@ -54,7 +55,8 @@ class Compositor:
         self._raster = Rasteriser(net.faces, net.nodes_px, (w, h), perspective=perspective)
         self._reference = shading.Reference(first)
         self._shade = np.ones((h // 2, w // 2), np.float32)
-        self._mask = np.zeros((h // 2, w // 2), np.uint8)
+        self._occlusion = Occlusion((w // 2, h // 2))
+        self._before: tuple[Floats, Array] | None = None  # the frame before at half the resolution, and the nodes in it
         first_map = self._mapped(net.nodes_px, np.ones(len(net.nodes_px)))
         covered = np.zeros((h, w), np.uint8)
         if first_map is not None:
@@ -82,22 +84,26 @@ class Compositor:
         surface = self._mapped(nodes, depths)
         if surface is None:
             return image
-        frame = even(image)
-        crop = frame[surface.region]
-        half = tuple(slice(s.start // 2, s.stop // 2) for s in surface.region)
-        view = self._reference.view(crop, surface.uv, surface.cover)
-        free = view.inside * (1 - self._mask[half])
-        gains = shading.exposure(view, free)
+        frame = shading.halved(even(image))
+        part = tuple(slice(s.start // 2, s.stop // 2) for s in surface.region)
+        view = self._reference.view(frame[part], surface.uv, surface.cover)
+        gains = shading.exposure(view, view.inside * (1 - self._occlusion.mask[part]))
         view = shading.View(view.seen, view.predicted * gains, view.variance, view.inside)
-        last = self._shade[half]
         corner = (surface.left, surface.top)
-        mask, agreement = occlusion_mask(
-            view, last, self._mask[half], (points - corner - 0.5) / 2, np.isfinite(observed_px[:, 0])
-        )
+        tracked = Tracked((points - corner - 0.5) / 2, np.isfinite(observed_px[:, 0]))
+        moved = self._moved(surface, nodes)
+        last = self._shade[part]
+        mask, agreement = self._occlusion.update(part, view, last, moved, tracked)
         shade = shading.shading(view, view.inside * (1 - mask) * agreement, last)
-        self._mask[:], self._shade[half] = 0, shade
-        self._mask[half] = mask
+        self._shade[part] = shade
+        self._before = (frame, nodes)
         return self._blended(image, surface, picture, shade[..., None] * gains, mask)
+
+    def _moved(self, surface: SurfaceMap, nodes: Array) -> Moved:
+        """The frame before, and how far the surface's pixels have come since."""
+        frame, before = self._before or (None, nodes)
+        displacement = self._surface.carried((nodes - before) / 2, shading.halved(surface.uv))
+        return Moved(frame, displacement, (surface.left // 2, surface.top // 2))
 
     def first(self, picture: Image) -> Image:
         """The first frame with the picture on it, in its light."""
@@ -117,25 +123,38 @@ class Compositor:
         return replace(surface, cover=surface.cover * (share * np.float32(1 / 255)))
 
     def _blended(self, image: Image, surface: SurfaceMap, picture: Image, light: Floats, mask: Mask) -> Image:
-        """The frame with the picture at the map's places, times the light (h / 2, w / 2, 3), not where the mask is set."""
+        """The frame with the picture at the map's places, times the light (h / 2, w / 2, 3), behind what the mask shows."""
         h, w = surface.cover.shape
         if self._pyramid is None or self._pyramid[0] is not picture:
             self._pyramid = (picture, Pyramid(picture, self._corners))
         layer = self._pyramid[1].sampled(surface.uv, surface.cover)
         uv = shading.halved(surface.uv)
         white = shading.quadratic(uv[..., 0], uv[..., 1], self._first.shape) @ self._white / PAPER
-        light = light * np.clip(white, 0.2, 1.2)[..., None].astype(np.float32)
-        light = cast(Floats, cv2.resize(light, (w, h), interpolation=cv2.INTER_LINEAR))
-        occluded = cv2.GaussianBlur(mask.astype(np.float32), (0, 0), FEATHER_PX)
-        occluded = cv2.resize(occluded, (w, h), interpolation=cv2.INTER_LINEAR)
-        share = surface.cover * (1 - occluded) * np.float32(self._opacity)
-        colour = cv2.multiply(cv2.cvtColor(layer, cv2.COLOR_BGRA2BGR), light, dtype=cv2.CV_32F)
-        colour = cv2.multiply(colour, cv2.merge([share] * 3))
+        lit = light * np.clip(white, 0.2, 1.2)[..., None].astype(np.float32)
+        share = surface.cover * np.float32(self._opacity)
+        colour = cv2.cvtColor(layer, cv2.COLOR_BGRA2BGR)
+        colour = cv2.multiply(colour, edge.enlarged(lit, (w, h)), dtype=cv2.CV_32F)
+        colour = cast(Floats, cv2.multiply(colour, cv2.merge([share] * 3)))
         rest = 1 - share * (layer[..., 3] * np.float32(1 / 255))
         out = even(image).copy()
         region = out[surface.region]
+        part, part2 = around(mask)
+        before = region[part2].copy()
         region[:] = cv2.add(cv2.multiply(region, cv2.merge([rest] * 3), dtype=cv2.CV_32F), colour, dtype=cv2.CV_8U)
+        if before.size:
+            region[part2] = edge.composed(before, region[part2], mask[part])
         return out[: image.shape[0], : image.shape[1]]
+
+
+def around(mask: Mask) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Rows and columns around what is set in a mask (h, w), at its resolution and at twice that."""
+    box = cv2.boundingRect(mask)
+    (h, w), (x, y, wide, tall) = mask.shape, box
+    if not wide:
+        return (slice(0, 0), slice(0, 0)), (slice(0, 0), slice(0, 0))
+    rows = slice(max(y - AROUND, 0), min(y + tall + AROUND, h))
+    columns = slice(max(x - AROUND, 0), min(x + wide + AROUND, w))
+    return (rows, columns), (slice(2 * rows.start, 2 * rows.stop), slice(2 * columns.start, 2 * columns.stop))
 
 
 def painted(first: Image, reference_px: Array, model: Model, picture: Image, placement: Placement) -> Image:

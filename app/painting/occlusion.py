@@ -1,43 +1,141 @@
 """The occlusion mask: where something, a hand for instance, is in front of the surface.
 
-A patch is occluded if no change of light explains its difference to the prediction. Tracked points that are seen there
-raise the threshold, points that are not seen lower it. Pixels are those of half the resolution.
+A patch is a candidate if no change of light explains its difference to the prediction. It is in front if it came there by a
+motion that is not the surface's, its colours are not the surface's, and neither a displacement of it nor seen points
+explain it. Pixels are those of half the resolution.
 """
 
+from dataclasses import dataclass
 from typing import cast
 
 import cv2
 import numpy as np
 
-from app.arrays import Array, Flags, Floats, Image, Mask
+from app.arrays import Array, Flags, Floats, Mask
+from app.painting import colours, evidence
 from app.painting.shading import View
 
 PATCH_PX = 9  # side of the patches
 MISMATCH = 6.0  # mean squared difference of a patch, in variances, that light does not explain
 MISMATCH_BEFORE = 3.0  # the same where the mask of the frame before is set
-POINTS_PX = 12.0  # reach of a tracked point
-VISIBLE_FACTOR, MISSING_FACTOR = 3.0, 0.4  # of MISMATCH, where points are seen and where they are not
 DARKER, BRIGHTER = 0.5, 1.6  # largest change of light from one frame to the next
-PIXEL_DEVIATIONS = 2.0  # of a pixel from its prediction
-BINS = (8, 32, 32)  # of brightness and two of colour
-CHROMA = (48, 207)
-RARE = 2e-5  # share of a colour that is never seen
-LOG_RATIO, LOG_RATIO_BEFORE = 1.7, 1.0  # mean logarithm of the ratio of colours: of a new patch, and where the mask was set
-LEAST_PX = 30  # area of the smallest patch
+LEAST_PX = 30  # area of the smallest patch, and of the smallest hole in one
 LEAST_INNER = 0.08  # share of the surface, of patches inside its outline: mouths and eyes are smaller
+STAYS = 0.5  # log-likelihood by which a pixel is held on the side where it was
+DISC = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (PATCH_PX, PATCH_PX))
+SMALL = np.ones((3, 3), np.uint8)
 
 
-def occlusion_mask(view: View, shade: Floats, before: Mask, points: Array, visible: Flags) -> tuple[Mask, Floats]:
-    """Where something hides the surface: (h, w) 0 or 1; and how well the frame agrees with its prediction, (h, w) 0 … 1.
+@dataclass(frozen=True)
+class Tracked:
+    """The vertices in the part of the picture that is looked at.
+
+    Attributes:
+        places: (p, 2) half-resolution px.
+        visible: (p,) which of them are seen.
+    """
+
+    places: Array
+    visible: Flags
+
+
+class Occlusion:
+    """The mask, carried from frame to frame.
+
+    Args:
+        size: (width, height) of the picture at half the resolution.
+
+    Attributes:
+        mask: (height, width) 0 or 1, of the last frame.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        width, height = size
+        self.mask: Mask = np.zeros((height, width), np.uint8)
+        self._moved = np.zeros((height, width), np.float32)
+        self._colours = colours.Colours()
+
+    def update(
+        self, part: tuple[slice, ...], view: View, shade: Floats, moved: evidence.Moved, tracked: Tracked
+    ) -> tuple[Mask, Floats]:
+        """The mask (h, w) of a part of a new frame, and how well that agrees with its prediction, (h, w) 0 … 1.
+
+        Args:
+            part: rows and columns of it; there is no mask elsewhere.
+            view: the frame against its prediction.
+            shade: (h, w) shading of the frame before.
+            moved: the frame before, moved as the surface has.
+            tracked: the vertices.
+        """
+        before = self.mask[part].copy()
+        patches, agreement = candidates(view, shade, before, evidence.threshold_factor(before.shape, *astuple(tracked)))
+        mask = np.zeros_like(before)
+        motion = self._motion(part, view, moved) if patches.any() else None
+        patches = across_outline(patches, view.inside)
+        if motion is not None and patches.any():
+            patches = self._in_front(patches, before, view, shade, motion, tracked)
+        if patches.any():
+            mask = self._refined(patches, before, view, shade)
+        self.mask[:] = 0
+        self.mask[part] = mask
+        if not mask.any():
+            self._colours.forget()
+        return mask, agreement
+
+    def _motion(self, part: tuple[slice, ...], view: View, moved: evidence.Moved) -> Floats:
+        """How far pixels (h, w) have not moved as the surface has, in this frame or lately."""
+        self._moved *= evidence.FADES
+        here = self._moved[part]
+        np.maximum(here, moved.mismatch(view), out=here)
+        return here
+
+    def _in_front(self, patches: Mask, before: Mask, view: View, shade: Floats, motion: Floats, tracked: Tracked) -> Mask:
+        """The components of a mask that something in front is to be seen in."""
+        count, found = cv2.connectedComponents(patches, connectivity=8)
+        label = found.astype(np.int64)
+        area = np.maximum(np.bincount(label.ravel(), minlength=count), 1)
+        known = np.bincount(label.ravel(), before.ravel(), minlength=count) / area > evidence.KNOWN
+        came = np.bincount(label.ravel(), (motion > evidence.MOTION).ravel(), minlength=count) / area > evidence.CAME
+        came &= area > evidence.LEAST * view.inside.sum()
+        share = evidence.seen_share(label, count, tracked.places, tracked.visible)
+        kept = (known & (share <= evidence.SEEN)) | (~known & came & (share <= evidence.SEEN_OF_NEW))
+        kept[0] = False
+        new = kept & ~known
+        if new.any():
+            some = cast(Mask, new[label].astype(np.uint8))
+            explained = evidence.displaced(view, shade, some)
+            other = colours.foreign(view, shade, some)
+            same = np.bincount(label.ravel(), explained.ravel(), minlength=count) / area > evidence.DISPLACED
+            own = np.bincount(label.ravel(), other.ravel(), minlength=count) / area < evidence.FOREIGN
+            kept &= ~(new & (same | own))
+        return cast(Mask, kept[label].astype(np.uint8))
+
+    def _refined(self, patches: Mask, before: Mask, view: View, shade: Floats) -> Mask:
+        """The mask at the pixels' resolution: where the occluder's colours are likelier than the surface as predicted."""
+        zone = cast(Mask, cv2.dilate(patches, DISC) * (view.inside > 0).astype(np.uint8))
+        likelihood = self._colours.ratio(view, shade, patches, zone)
+        held = STAYS * (2.0 * before.astype(np.float32) - 1.0)
+        score = cv2.GaussianBlur(np.clip(likelihood, -5, 5), (0, 0), 0.8) + held
+        smooth = cast(Mask, cv2.medianBlur(((zone > 0) & (score > 0)).astype(np.uint8), 5))
+        mask = across_outline(without_specks(smooth), view.inside)
+        # On to the pixels that show the surface in part.
+        return np.where(view.inside > 0, mask, cv2.dilate(mask, np.ones((5, 5), np.uint8))).astype(np.uint8)
+
+
+def astuple(tracked: Tracked) -> tuple[Array, Flags]:
+    """Places and visibility."""
+    return tracked.places, tracked.visible
+
+
+def candidates(view: View, shade: Floats, before: Mask, factor: Floats) -> tuple[Mask, Floats]:
+    """Patches that are not as predicted, (h, w) 0 or 1; and how well the frame agrees with its prediction, (h, w) 0 … 1.
 
     Args:
         view: the frame against its prediction.
         shade: (h, w) shading of the frame before.
         before: (h, w) mask of the frame before.
-        points: (p, 2) half-resolution px.
-        visible: (p,) which of them are seen.
+        factor: (h, w) of the threshold.
     """
-    factor = threshold_factor(view.inside.shape, points, visible)
     weight = view.inside / view.variance
     predicted, seen = view.predicted, view.seen
     pp, ip, ii = (
@@ -50,64 +148,18 @@ def occlusion_mask(view: View, shade: Floats, before: Mask, points: Array, visib
     limit = np.where(before > 0, MISMATCH_BEFORE, MISMATCH) * factor
     agreement = (1.0 / (1.0 + (mismatch / MISMATCH) ** 2)).astype(np.float32)
     patches = ((mismatch > limit) & (view.inside > 0)).astype(np.uint8)
-    patches = cast(Mask, cv2.morphologyEx(patches, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)))
-    patches = across_outline(patches, view.inside)
-    if patches.any():
-        ratio = colour_ratio(view, patches, shade)
-        patches = of_other_colours(patches, ratio, before)
-        if patches.any():
-            patches = refined(patches, view, shade, ratio)
-    return patches, agreement
+    return cast(Mask, cv2.morphologyEx(patches, cv2.MORPH_OPEN, SMALL)), agreement
 
 
-def colour_ratio(view: View, patches: Mask, shade: Floats) -> Floats:
-    """Logarithm (h, w) of how much more frequent a pixel's colour is in the patches than on the surface."""
-    seen, expected = codes(view.seen), codes(view.predicted * shade[..., None])
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (PATCH_PX, PATCH_PX))
-    middle = cast(Mask, cv2.erode(patches, np.ones((5, 5), np.uint8)))
-    away = ((view.inside > 0) & (cv2.dilate(patches, disc) == 0)).astype(np.uint8)
-    occluder = histogram(seen, middle if middle.any() else patches)
-    surface = 0.5 * histogram(seen, away) + 0.5 * histogram(expected, view.inside.astype(np.uint8))
-    ratios = np.log((occluder + RARE) / (surface + RARE)).astype(np.float32)
-    return ratios[tuple(np.moveaxis(seen, -1, 0))]
-
-
-def codes(picture: Floats) -> Image:
-    """Bins (h, w, 3) of brightness and of two of colour."""
-    colours = cv2.cvtColor(np.clip(picture, 0, 255).astype(np.uint8), cv2.COLOR_BGR2YCrCb)
-    chroma = np.clip(colours[..., 1:], *CHROMA) - np.uint8(CHROMA[0])
-    return np.dstack([colours[..., 0] // 32, chroma // 5]).astype(np.uint8)
-
-
-def histogram(picture: Image, where: Mask) -> Floats:
-    """Share (8, 32, 32) of each bin in the pixels where a mask is set, smoothed in colour."""
-    counts = cv2.calcHist([picture], [0, 1, 2], where, list(BINS), [0, 8, 0, 32, 0, 32])
-    smooth = np.stack([cv2.GaussianBlur(plane, (0, 0), 1.0) for plane in counts])
-    return cast(Floats, smooth / max(float(counts.sum()), 1.0))
-
-
-def of_other_colours(patches: Mask, ratio: Floats, before: Mask) -> Mask:
-    """The patches whose colours are not the surface's: an opening mouth is the surface's own change."""
-    count, label = cv2.connectedComponents(patches, connectivity=8)
-    area = np.maximum(np.bincount(label.ravel(), minlength=count), 1)
-    mean_ratio = np.bincount(label.ravel(), np.clip(ratio, -3, 3).ravel(), minlength=count) / area
-    known = np.bincount(label.ravel(), before.ravel(), minlength=count) / area
-    kept = mean_ratio > np.where(known > 0.3, LOG_RATIO_BEFORE, LOG_RATIO)
-    kept[0] = False
-    return kept[label].astype(np.uint8)
-
-
-def refined(patches: Mask, view: View, shade: Floats, ratio: Floats) -> Mask:
-    """The mask at the pixels' resolution: near the patches, by colour and by the difference to the prediction."""
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (PATCH_PX, PATCH_PX))
-    small = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
-    near = cv2.dilate(patches, disc)
-    off = view.seen - shade[..., None] * view.predicted
-    deviations = np.sqrt(cv2.GaussianBlur(np.einsum("hwc,hwc->hw", off, off) / (3.0 * view.variance), (0, 0), 1.0))
-    score = cv2.GaussianBlur(np.clip(ratio, -3, 3), (0, 0), 1.0) + np.clip(2 * (deviations - PIXEL_DEVIATIONS), -4, 0.5)
-    mask = ((near > 0) & (score > 0)).astype(np.uint8)
-    mask = cast(Mask, cv2.morphologyEx(cv2.morphologyEx(mask, cv2.MORPH_OPEN, small), cv2.MORPH_CLOSE, small))
-    return across_outline(mask, view.inside)
+def without_specks(mask: Mask) -> Mask:
+    """A mask without components and holes that are smaller than a patch may be."""
+    for side in (0, 1):
+        _count, label, stats, _ = cv2.connectedComponentsWithStats((mask == side).astype(np.uint8), connectivity=4)
+        small = stats[:, cv2.CC_STAT_AREA] < LEAST_PX
+        small[0] = False
+        if small.any():
+            mask = np.where(small[label], 1 - side, mask).astype(np.uint8)
+    return mask
 
 
 def across_outline(mask: Mask, inside: Floats) -> Mask:
@@ -121,18 +173,3 @@ def across_outline(mask: Mask, inside: Floats) -> Mask:
     kept = (area >= LEAST_PX) & (at_edge | (area > LEAST_INNER * inside.sum()))
     kept[0] = False
     return kept[label].astype(np.uint8)
-
-
-def threshold_factor(shape: tuple[int, ...], points: Array, visible: Flags) -> Floats:
-    """Factor (h, w) of the threshold: larger where points are seen, smaller where they are missing."""
-    h, w = shape
-    step = 4
-    size = (h // step + 1, w // step + 1)
-    cell = np.rint(points / step).astype(np.int64)
-    within = ((cell >= 0) & (cell < size[::-1])).all(axis=1)
-    number = cell[within, 1] * size[1] + cell[within, 0]
-    maps = [np.bincount(number, flags[within].astype(float), minlength=size[0] * size[1]) for flags in (visible, ~visible)]
-    near = cv2.GaussianBlur(np.stack(maps, axis=-1).reshape(*size, 2), (0, 0), POINTS_PX / 2 / step)
-    share = (near[..., 0] + 1e-3) / (near.sum(axis=-1) + 2e-3)
-    factor = MISSING_FACTOR * (VISIBLE_FACTOR / MISSING_FACTOR) ** share
-    return cast(Floats, cv2.resize(factor.astype(np.float32), (w, h), interpolation=cv2.INTER_LINEAR))

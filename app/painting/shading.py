@@ -58,12 +58,12 @@ class Reference:
         variance = NOISE**2 + MISPLACED**2 * cv2.GaussianBlur(steep, (0, 0), 1.0)
         self._layers = np.dstack([small, variance]).astype(np.float32)
 
-    def view(self, crop: Image, uv: Floats, cover: Floats) -> View:
-        """The part of a frame that a map (h, w, 2) with its cover (h, w) belongs to, both of even size."""
+    def view(self, seen: Floats, uv: Floats, cover: Floats) -> View:
+        """The part of a frame, at half the resolution, that a map (h, w, 2) with its cover (h, w) belongs to."""
         inside = (halved(cover) == 1).astype(np.float32)
         places = (halved(uv) - np.float32(0.5)) * np.float32(0.5)
         layers = sampled(self._layers, places, cv2.BORDER_REPLICATE)
-        return View(halved(crop), layers[..., :3], layers[..., 3], inside)
+        return View(seen, layers[..., :3], layers[..., 3], inside)
 
 
 def sampled(picture: Pixels, places: Floats, border: int) -> Pixels:

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array, eye_array, kron, vstack
 from scipy.sparse.linalg import splu
 
-from app.arrays import Array, Flags, Indices, Mask
+from app.arrays import Array, Flags, Floats, Indices, Mask
+from app.painting.shading import sampled
 from reconstruction.basis.mesh import Mesh
 
 NODES = 450  # of the net, about
@@ -52,6 +53,7 @@ class Surface:
         self.region = region
         if region is not None:
             self.net = Net(self.net.nodes_px, faces_in(self.net, region))
+        self._to_net, self._shape_of_net = to_net, (rows + 1, columns + 1)
         places = mapped(reference_px, to_net)
         self._shape = Interpolation(places, (columns, rows), bends(columns + 1, rows + 1), BENDING)
         self._offset = Interpolation(places, (columns, rows), steps(columns + 1, rows + 1), TENSION)
@@ -70,6 +72,11 @@ class Surface:
         shape = self._shape(np.column_stack([projection_px * weight, weight, depth]))
         far = np.maximum(shape[:, 2:3], NEAREST * float(weight.mean()))
         return np.asarray(shape[:, :2] / far + self._offset(points_px - projection_px)), shape[:, 3]
+
+    def carried(self, values: Array, uv: Floats) -> Floats:
+        """Values (q, 2) of the nodes, at places uv (h, w, 2) px of the first frame."""
+        net = cast(Floats, values.reshape(*self._shape_of_net, 2).astype(np.float32))
+        return sampled(net, cast(Floats, cv2.perspectiveTransform(uv, self._to_net)), cv2.BORDER_REPLICATE)
 
     def corrected(self, projection_px: Array, observed_px: Array) -> Array:
         """The vertices (p, 2) where they are seen; others are moved off the shape as their neighbours are."""
