@@ -19,6 +19,7 @@ Log = Callable[[str], None]
 PATIENCE_S = 60.0  # a broken stream is waited for
 RETRY_S = 0.5  # between two attempts
 MOST_ASPECT, LEAST_ASPECT = 4.0, 0.005  # of pixels: beyond is a mistake, below is rounding
+FEW_BITS = 0.01  # a pixel: H.264 of so few has lost most texture; usual videos have 0.05 to 0.2
 PROBED = 12  # frames: more than a decoder reorders
 TIMEOUT_MS = 5000  # a server that says nothing for so long is gone
 
@@ -108,6 +109,16 @@ def pixel_aspect(capture: Capture) -> float:
     return aspect if 1 / MOST_ASPECT < aspect < MOST_ASPECT else 1.0
 
 
+def bits_per_px(capture: Capture) -> float | None:
+    """What a video's encoder spends on a pixel; None where it does not say."""
+    size, fps = (
+        [capture.get(side) for side in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)],
+        capture.get(cv2.CAP_PROP_FPS),
+    )
+    bits, pixels = 1000 * capture.get(cv2.CAP_PROP_BITRATE), size[0] * size[1] * fps
+    return bits / pixels if bits > 0 and pixels > 0 else None
+
+
 def squared(capture: Capture, source: str, log: Log) -> Capture:
     """A capture of square pixels; `log` is told where the video's are not."""
     aspect = pixel_aspect(capture)
@@ -145,6 +156,9 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
     file = cv2.VideoCapture(source)
     if not file.isOpened():
         raise TrackingError(f"{source} cannot be decoded; it is not a video, or it is damaged or cut off")
+    bits = bits_per_px(cast(Capture, file))
+    if bits is not None and bits < FEW_BITS:
+        log(f"{source} is compressed to {bits:.2g} bits a pixel: little texture is left to follow; export it with more")
     return squared(cast(Capture, file), source, log)
 
 

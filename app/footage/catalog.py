@@ -52,6 +52,6 @@ _CASES = (
     Case("a title card first", 2.6, before=titled),
     Case("an image missing", 2.6, storage=Storage(left_out=(50,))),
     Case("50 kbit/s", None, storage=Storage(bit_rate=50_000)),
-    Case("4K", 2.1, stretch=(4.5, 4.5)),
+    Case("4K", 2.1, stretch=(4.5, 4.5), storage=Storage(bit_rate=40_000_000)),
 )  # fmt: skip
 CASES = {case.name: case for case in _CASES}

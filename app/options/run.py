@@ -74,6 +74,9 @@ class Source:
     """Stop so many seconds after the first frame."""
     drop_late: bool = False
     """Of a camera or stream, take always the newest frame, and leave out those there is no time for."""
+    full_size: bool = False
+    """Follow points in the pictures as they are; without it, in copies of those 2560 px wide and more, a half to a
+    quarter as wide. Pixels of the results are the pictures' either way."""
     points: int = 800
     """Most points tracked."""
     rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|PATH")] = "auto"

@@ -3,11 +3,14 @@
 import re
 import subprocess
 import sys
+from fractions import Fraction
 from pathlib import Path
 
+import av
 import cv2
 import pytest
 
+from tests.tracking.scene import texture
 from tracking import TrackingError
 from tracking.capture import times_rise
 from tracking.video import Frame, Video
@@ -74,3 +77,33 @@ def test_times_in_the_decoder_s_order_are_not_believed(shared_data: Path) -> Non
     assert not times_rise(str(shared_data / "box.mp4"))
     with Video(str(shared_data / "box.mp4"), stop=40) as video:
         assert [frame.time_s for frame in video] == pytest.approx([k / video.fps for k in range(40)])
+
+
+def encoded(path: Path, pixel_aspect: Fraction = Fraction(1), bit_rate: int | None = None) -> Path:
+    with av.open(str(path), "w") as file:
+        stream = file.add_stream("libx264", 30)
+        stream.width, stream.height, stream.pix_fmt = 320, 240, "yuv420p"
+        stream.codec_context.sample_aspect_ratio = pixel_aspect
+        if bit_rate:
+            stream.bit_rate = bit_rate
+        for _ in range(30):
+            file.mux(stream.encode(av.VideoFrame.from_ndarray(texture(), format="bgr24")))
+        file.mux(stream.encode(None))
+    return path
+
+
+@pytest.mark.parametrize(("aspect", "size"), [((4, 3), (427, 240)), ((8, 9), (320, 270)), ((1, 1), (320, 240))])
+def test_pixels_are_read_square(tmp_path: Path, aspect: tuple[int, int], size: tuple[int, int]) -> None:
+    told: list[str] = []
+    with Video(str(encoded(tmp_path / "wide.mp4", Fraction(*aspect))), log=told.append) as video:
+        assert video.size == size
+        assert {frame.image.shape[1::-1] for frame in video} == {size}
+    assert ["times as wide as high" in line for line in told] == [True] * (aspect != (1, 1))
+
+
+def test_a_poor_bit_rate_is_told(tmp_path: Path) -> None:
+    told: list[str] = []
+    Video(str(encoded(tmp_path / "poor.mp4", bit_rate=5_000)), log=told.append).close()
+    assert "bits a pixel" in "".join(told)
+    Video(str(encoded(tmp_path / "usual.mp4"))).close()
+    assert len(told) == 1

@@ -1,11 +1,12 @@
 """What a run begins with: the surface in the first frames, unless the region is to be taken as it is given."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from itertools import chain
 
 from app.arrays import Image
 from app.options.run import Source
+from app.pipeline.stages.working_copy import WorkingCopy
 from tracking.region.mask import region_mask
 from tracking.region.search import Found, search
 from tracking.region.surface import Surface
@@ -36,15 +37,16 @@ def first_look(config: Source, video: Video) -> FirstLook:
         TrackingError: no frame with texture, or a region or mask that does not fit the picture.
     """
     region, frames = region_mask(video.size, config.roi, config.mask, config.outline), iter(video)
+    copy = WorkingCopy(video.size, full=config.full_size)
     if not config.search or config.outline is not None:  # drawn by hand
         return FirstLook(frames, region, [])
     if video.live:
         kept: list[Frame] = []
-        found = search(keeping(frames, kept), region)
+        found = copy.found(search(copies(keeping(frames, kept), copy), copy.picture(region)))
         frames = chain(kept, frames)
     else:
         with Video(config.source, *config.frame_range, duration_s=config.duration) as ahead:
-            found = search(ahead, region)
+            found = copy.found(search(copies(ahead, copy), copy.picture(region)))
     begun = next(frame for frame in frames if frame.index >= found.first.index)
     return FirstLook(chain([begun], frames), found.region, notes_on(found, video.first_index))
 
@@ -56,6 +58,11 @@ def keeping(frames: Iterator[Frame], kept: list[Frame]) -> Iterator[Frame]:
         yield frame
         if len(kept) * frame.image.nbytes > MOST_BYTES:
             return
+
+
+def copies(frames: Iterable[Frame], copy: WorkingCopy) -> Iterator[Frame]:
+    """The frames with smaller pictures, if those are large."""
+    return (replace(frame, image=copy.picture(frame.image)) for frame in frames)
 
 
 def notes_on(found: Found, began: int) -> list[str]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from app.arrays import Array, Image
 from app.options.run import Run
 from app.pipeline.stages.first_look import first_look
+from app.pipeline.stages.working_copy import WorkingCopy
 from reconstruction.camera import Camera
 from reconstruction.settings import RecoveredRestShape
 from tracking import TrackingError
@@ -121,6 +122,10 @@ class TrackingStage:
             drop_late=config.drop_late,
             log=self._told.append,
         )
+        self._copy = WorkingCopy(self.video.size, full=config.full_size)
+        if self._copy.factor > 1:
+            width, height = (side // self._copy.factor for side in self.video.size)
+            self._told.append(f"points are followed in pictures of {width}x{height} px; --full-size takes all of them")
         self._frames: Iterator[Frame] | None = None
         self._trackers: dict[int, GuardedTracker] = {}
         self._number = 0
@@ -147,7 +152,8 @@ class TrackingStage:
         keep(self._number, frame.image)
         decoded, read_s = perf_counter(), self.video.arrived_s(frame)
         self._trackers = {one: tracker for one, tracker in self._trackers.items() if one in asked.expected_px}
-        objects = {one: self._object(one, frame, expected_px) for one, expected_px in asked.expected_px.items()}
+        image = self._copy.picture(frame.image)
+        objects = {one: self._object(one, frame.index, image, expected) for one, expected in asked.expected_px.items()}
         tracked = perf_counter()
         told = tuple(self._told)
         del self._told[: len(told)]  # another thread may be adding
@@ -155,31 +161,33 @@ class TrackingStage:
         self._number += 1
         return Seen(self._number - 1, frame.index, frame.time_s, read_s, objects, told, milliseconds)
 
-    def _object(self, one: int, frame: Frame, expected_px: Array | None) -> Begun | Guarded | TrackingError:
+    def _object(self, one: int, index: int, image: Image, expected_px: Array | None) -> Begun | Guarded | TrackingError:
+        """One of the objects in the (copy of the) picture of a frame of that index."""
         if one in self._trackers:
-            guarded = self._trackers[one].track(frame.image, expected_px)
+            expected = None if expected_px is None else self._copy.points(expected_px)
+            guarded = self._copy.guarded(self._trackers[one].track(image, expected))
             if guarded.change is Change.NONE and guarded.reason:
-                self._told.append(f"frame {frame.index}: {guarded.reason}")
+                self._told.append(f"frame {index}: {guarded.reason}")
             return guarded
         try:
-            points_px = first_points(self._config, frame.image, self._region)
+            points_px = first_points(self._config, image, self._region, self._copy)
         except TrackingError as error:
             return error
         begun = Begun(points_px, outline(self._region))
         given = self._config
         self._region = region_mask(self.video.size, given.roi, given.mask, given.outline)  # others may be anywhere in it
-        self._trackers[one] = GuardedTracker(frame.image, points_px)
+        self._trackers[one] = GuardedTracker(image, self._copy.points(points_px))
         return begun
 
 
-def first_points(config: Run, image: Image, region: Image) -> Array:
-    """The points (P, 2) px of an object that begins in a picture, in a region (H, W) uint8 of it.
+def first_points(config: Run, image: Image, region: Image, copy: WorkingCopy) -> Array:
+    """The points (P, 2) px of an object that begins in a picture, by its copy, in a region (H, W) uint8 of the picture.
 
     Raises:
         UsageError, TrackingError: a mesh that does not fit the picture, or too few corners.
     """
     gray = cast(NDArray[np.uint8], cv2.cvtColor(image, cv2.COLOR_BGR2GRAY))
-    points_px = detect_corners(gray, region, config.points)
+    points_px = copy.in_picture(detect_corners(gray, copy.picture(region), config.points))
     if config.rest_shape in RECOVERED:
         return points_px
     from app.files.mesh_file import rest_of_surface  # trimesh takes its time to load

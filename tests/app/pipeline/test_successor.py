@@ -17,6 +17,7 @@ from app.options.retexture import Retexture
 from app.options.run import Output, Run
 from app.pipeline.session import Session
 from app.pipeline.stages.tracking import Begun, Seen, first_points
+from app.pipeline.stages.working_copy import WorkingCopy
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import AFTER_CUT_S, Successor, options_for_another
 from app.playback.playback import Playback
@@ -210,13 +211,14 @@ def test_what_is_covered_has_longer_than_what_was_cut(cut: bool, wait_s: float) 
     lost = Seen(0, 0, 100.0, 0.0, {}, (), {})
     successor = Successor(config, lost, 0, Stopwatch(), at_once, cut=cut)
     trackers: dict[int, GuardedTracker] = {}
+    whole = np.full(pictures[0].shape[:2], 255, np.uint8)
     for index, picture in enumerate(pictures):
         objects: dict[int, Begun | Guarded | TrackingError] = {}
         for one, expected_px in successor.expected_px.items():
             if one in trackers:
                 objects[one] = trackers[one].track(picture, expected_px)
             else:
-                objects[one] = begun = Begun(first_points(config, picture, np.full(picture.shape[:2], 255, np.uint8)))
+                objects[one] = begun = Begun(first_points(config, picture, whole, WorkingCopy(SIZE)))
                 trackers[one] = GuardedTracker(picture, begun.points_px)
         seen = replace(lost, index=index, time_s=100.0 + wait_s - 1.0 + index / 30, objects=objects)
         successor.look(seen, partial(np.copy, picture))
