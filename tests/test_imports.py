@@ -27,7 +27,7 @@ ARROWS = {
     "app.painting": SHOWN,
     "app.recording": SHOWN | {"app.processes"},
     "app.figures": {"app.recording"},
-    "app.playback": SHOWN | {"app.figures", "app.recording"},
+    "app.playback": SHOWN | {"app.figures", "app.processes", "app.recording"},
     "app.pipeline": SHOWN | {"app.painting", "app.processes", "app.recording"},
     "app.picking": {"app.files", "app.terminal"},
     "app.demo": {"app.files", "app.terminal"},

@@ -5,6 +5,7 @@ import rerun.blueprint as rrb
 from rerun.chunk import Chunk
 
 from app.playback.measures import Reviewed
+from app.playback.reading.chunks import ChunkFile
 from app.recording import entities
 from app.recording.blueprint import SLOW_MS, blueprint, curves, mesh_view, video_view
 
@@ -24,7 +25,7 @@ def show(reviewed: list[Reviewed], url: str) -> None:
     stream.send_recording_name(" | ".join(one.label for one in reviewed))
     try:
         for one, side in zip(reviewed, SIDES, strict=False):
-            for chunk in one.playback.file:
+            for chunk in ChunkFile(one.playback.path):
                 if not chunk.entity_path.startswith("/__"):  # properties, as the name
                     rr.send_chunks(below(side, chunk) if two else chunk, recording=stream)
             if two:

@@ -3,7 +3,7 @@
 import json
 from typing import cast
 
-from app.playback.chunks import STATIC, Rows
+from app.playback.reading.rows import STATIC, Rows
 from app.recording import entities
 
 DOCUMENT = "modeshape.Document:"
@@ -17,7 +17,10 @@ def document(rows: Rows, entity: str) -> tuple[dict[str, object] | None, str]:
     if STATIC not in texts:
         return None, "unknown"
     version = cast(list[str], rows.static(entity, f"{DOCUMENT}version"))[0]
-    return json.loads(cast(list[str], texts[STATIC].value)[0]), version
+    words = json.loads(cast(list[str], texts[STATIC].value)[0])
+    if not isinstance(words, dict):
+        raise ValueError(f"{entity} is no list of names and values")
+    return words, version
 
 
 def events(rows: Rows) -> list[tuple[int, float, str, str]]:

@@ -7,7 +7,8 @@ from typing import cast
 import numpy as np
 
 from app.arrays import Array, Flags, Indices
-from app.playback.chunks import Rows
+from app.playback.reading.checks import LARGEST, LARGEST_PX, numbers
+from app.playback.reading.rows import Rows
 from app.recording import entities
 from reconstruction.basis.model import Model
 from reconstruction.camera import quaternion_from_rotation, rotation_from_quaternion
@@ -48,19 +49,21 @@ def read_observations(rows: Rows) -> Observations | None:
     observed = rows.last(entities.OBSERVATION, f"{OBSERVATION}visible")
     seen = rows.last(entities.SEEN, POSITIONS)
     phases = rows.last(entities.OBSERVATION, f"{OBSERVATION}phase")
-    numbers = sorted(observed.keys() & seen.keys() & phases.keys())  # what was cut off may have one without another
-    if not numbers:
+    frames = sorted(observed.keys() & seen.keys() & phases.keys())  # what was cut off may have one without another
+    if not frames:
         return None
-    visible = np.stack([cast(Flags, observed[k].value) for k in numbers])
+    visible = np.stack([cast(Flags, observed[k].value) for k in frames])
     points = np.full((*visible.shape, 2), np.nan)
-    positions = np.concatenate([cast(Array, seen[k].value) for k in numbers])
-    if len(positions) != visible.sum():
+    positions = np.concatenate([cast(Array, seen[k].value) for k in frames])
+    if visible.dtype != np.bool_ or positions.shape != (visible.sum(), 2):
         raise ValueError("the points and their visibility disagree")
+    if visible.any():
+        numbers(positions, "places of points", LARGEST_PX)
     points[visible] = positions
     return Observations(
-        frames=np.array(numbers, np.int64),
-        times_s=np.array([observed[k].time_s for k in numbers]),
-        phases=[cast(list[str], phases[k].value)[0] for k in numbers],
+        frames=np.array(frames, np.int64),
+        times_s=np.array([observed[k].time_s for k in frames]),
+        phases=[cast(list[str], phases[k].value)[0] for k in frames],
         W=points.transpose(0, 2, 1).copy(),
         visible=visible,
     )
@@ -110,6 +113,10 @@ def read_estimates(rows: Rows, entity: str, frames: Sequence[int], models: Seque
         if not all(frame in rows_of_name for rows_of_name in values.values()):
             continue
         q, t, s, Lambda, number = (np.asarray(cast(Array, one[frame].value)) for one in values.values())
+        for name, value in (("rotations", q), ("places", t), ("sizes", s), ("deformations", Lambda)):
+            numbers(value, f"frame {frame} has {name}", LARGEST)
+        if not (s[0] > 0 and int(number[0]) >= 0 and np.abs(q @ q - 1) < 1e-3):
+            raise ValueError(f"the shape of frame {frame} has no size or no orientation")
         model = models[int(number[0])]
         if model is not models[-1]:
             single = Estimates(q[None], t[None], s, Lambda.reshape(1, 3, -1), np.full((1, points), np.nan))

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from app.arrays import Image
-from app.playback.chunks import RecordingFile, column_rows
+from app.playback.reading.file import RecordingFile
 from app.recording import entities
 from app.terminal.errors import UsageError
 from tracking import TrackingError
@@ -28,7 +28,7 @@ def stored_images(file: RecordingFile, frames: list[int]) -> Iterator[tuple[int,
     Raises:
         UsageError: the embedded video cannot be decoded.
     """
-    rows = file.rows(lambda entity, component: entity == entities.IMAGE and component in (JPEG_TYPE, VIDEO_TYPE))
+    rows = file.rows((entities.IMAGE, JPEG_TYPE), (entities.IMAGE, VIDEO_TYPE))
     videos = rows.last(entities.IMAGE, VIDEO_TYPE)
     if videos:
         media = cast(list[str], next(iter(videos.values())).value)[0]
@@ -45,20 +45,22 @@ def from_jpegs(file: RecordingFile, frames: list[int], newest: dict[bytes, int])
         while frame in there and frame not in waiting:
             waiting.update([next(found)])
         blob = waiting.pop(frame, b"")
-        image = cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR) if blob else None
-        yield i, cast(Image | None, image)
+        yield i, decoded(blob)
+
+
+def decoded(blob: bytes) -> Image | None:
+    """A picture (H, W, 3) BGR; None if it is damaged, or too large for anybody."""
+    try:
+        return cast(Image | None, cv2.imdecode(np.frombuffer(blob, np.uint8), cv2.IMREAD_COLOR) if blob else None)
+    except cv2.error:
+        return None
 
 
 def jpegs(file: RecordingFile, newest: dict[bytes, int]) -> Iterator[tuple[int, bytes]]:
     """Frame and JPEG of the rows that count, in the order of the file."""
-    for chunk in file:
-        if chunk.entity_path.lstrip("/") != entities.IMAGE:
-            continue
-        batch = chunk.to_record_batch()
-        if JPEG in batch.schema.names:
-            for row in column_rows(batch, JPEG):
-                if row.id in newest:
-                    yield row.frame, cast(bytes, row.value)
+    for entity, _, rows in file.pieces((entities.IMAGE, JPEG)):
+        if entity == entities.IMAGE:
+            yield from ((row.frame, cast(bytes, row.value)) for row in rows if row.id in newest)
 
 
 def from_video(file: RecordingFile, frames: list[int], suffix: str) -> Iterator[tuple[int, Image | None]]:
@@ -66,7 +68,7 @@ def from_video(file: RecordingFile, frames: list[int], suffix: str) -> Iterator[
     row_of, following = {frame: i for i, frame in enumerate(frames)}, 0
     with TemporaryDirectory() as folder:
         path = Path(folder, f"video{suffix}")
-        asset = file.rows(lambda entity, component: (entity, component) == (entities.IMAGE, VIDEO))
+        asset = file.rows((entities.IMAGE, VIDEO))
         try:
             path.write_bytes(cast(bytes, asset.static(entities.IMAGE, VIDEO)))
         except OSError as error:

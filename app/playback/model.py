@@ -7,7 +7,8 @@ from typing import cast
 import numpy as np
 
 from app.arrays import Array, Image, Indices
-from app.playback.chunks import Rows
+from app.playback.reading.checks import check_model
+from app.playback.reading.rows import Rows
 from app.recording import entities
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model
@@ -38,7 +39,7 @@ class RecordedModel:
 
 
 def read_models(rows: Rows) -> list[Model]:
-    """The models of a recording, in the order of their numbers."""
+    """The models of a recording, in the order of their numbers. Raises a ValueError if one cannot be."""
     models: list[Model] = []
     while rows.last(entity := f"{entities.MODEL}/{len(models)}", f"{MODEL}rest"):
         value = partial(static, rows, entity)
@@ -46,7 +47,9 @@ def read_models(rows: Rows) -> list[Model]:
         Upsilon = value("Upsilon").reshape(-1, rest.shape[1])
         basis = ModalBasis(rest, Upsilon, value("eigenvalues"), value("Phi").reshape(3, 3))
         faces, edges = (value(name).reshape(-1, width).astype(np.int64) for name, width in (("faces", 3), ("edges", 2)))
-        models.append(Model(basis, Mesh(faces, edges), Camera(float(value("focal_px")[0]), value("center_px"))))
+        model = Model(basis, Mesh(faces, edges), Camera(float(value("focal_px")[0]), value("center_px")))
+        check_model(model, value("size"), value("texture_px").reshape(-1, 2))
+        models.append(model)
     return models
 
 

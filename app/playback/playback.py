@@ -12,11 +12,11 @@ from typing import Self, cast
 import numpy as np
 
 from app.arrays import Array, Flags, Image, Indices
-from app.playback.chunks import RecordingFile
 from app.playback.documents import DOCUMENT, NAME, SCALARS, document, events, recording_name, stages
 from app.playback.frames import ESTIMATE, OBSERVATION, POSITIONS, Estimates, read_estimates, read_observations
 from app.playback.images import stored_images
 from app.playback.model import MODEL, TEXTURE, RecordedModel, read_models, with_texture
+from app.playback.reading.file import RecordingFile
 from app.recording import entities
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
@@ -24,6 +24,15 @@ from reconstruction.basis.model import Model
 from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
+
+# What is kept in memory: everything but pictures and what the estimates are drawn with.
+WANTED = (
+    (entities.MESH, TEXTURE),
+    (entities.SEEN, POSITIONS),
+    (entities.TIMING, SCALARS),
+    NAME,
+    *(("", component) for component in (MODEL, ESTIMATE, OBSERVATION, DOCUMENT, "TextLog:")),
+)
 
 
 @dataclass(frozen=True)
@@ -79,7 +88,7 @@ class Playback:
         file = RecordingFile(path)
         try:
             return cls._of(file, online=online)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError, ArithmeticError) as error:
             if isinstance(error, UsageError):
                 raise
             raise UsageError(
@@ -88,7 +97,7 @@ class Playback:
 
     @classmethod
     def _of(cls, file: RecordingFile, *, online: bool) -> Self:
-        rows = file.rows(wanted)
+        rows = file.rows(*WANTED)
         entity = entities.ONLINE if online else entities.ESTIMATE
         if online and not rows.last(entity, f"{ESTIMATE}s"):
             raise UsageError(f"{file.path} does not hold what was shown on the way: run again with --keep-online")
@@ -97,7 +106,11 @@ class Playback:
             raise UsageError(f"{file.path} contains no frame: the run ended before its first, or its start was lost")
         models = read_models(rows)
         used = [int(cast(Array, row.value)[0]) for row in rows.last(entity, f"{ESTIMATE}model").values()]
+        if min(used, default=0) < 0:
+            raise ValueError("shapes of a model before the first")
         models = models[: max(used, default=len(models)) + 1]
+        if models and models[-1].basis.rest.shape[1] != observed.visible.shape[1]:
+            raise ValueError("shapes and tracks are of different points")
         recorded_model = with_texture(rows, models)
         numbers = observed.frames.tolist()
 
@@ -211,8 +224,18 @@ class Playback:
         return shapes
 
     def images(self) -> Iterator[tuple[int, Image | None]]:
-        """Row and picture (H, W, 3) BGR of every frame, decoded one at a time; None where there is none."""
-        return stored_images(self.file, self.frames.tolist())
+        """Row and picture (H, W, 3) BGR of every frame, decoded one at a time; None where there is none.
+
+        Raises:
+            UsageError: they are not all of one size.
+        """
+        size = self.recorded_model.size if self.recorded_model else None
+        for i, image in stored_images(self.file, self.frames.tolist()):
+            if image is not None:
+                size = size or (image.shape[1], image.shape[0])
+                if image.shape[1::-1] != size:
+                    raise UsageError(f"{self.path} holds pictures of several sizes: run again to make another")
+            yield i, image
 
     @property
     def _known_model(self) -> RecordedModel:
@@ -222,15 +245,3 @@ class Playback:
                 "run again for longer, or with --rest-shape plane"
             )
         return self.recorded_model
-
-
-def wanted(entity: str, component: str) -> bool:
-    """What is kept in memory: everything but pictures and what the estimates are drawn with."""
-    if entity == entities.MESH:
-        return component.startswith(TEXTURE)
-    if entity == entities.SEEN:
-        return component == POSITIONS
-    if entity.startswith(entities.TIMING):
-        return component == SCALARS
-    ours = (MODEL, ESTIMATE, OBSERVATION, DOCUMENT, "TextLog:")
-    return (entity, component) == NAME or component.startswith(ours)

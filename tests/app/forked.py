@@ -64,6 +64,7 @@ def started(module: str, *files: int) -> Forked:
 def main() -> None:
     from app.figures import modes_figure  # noqa: F401
     from app.pipeline.stages import maps, tracking_process  # noqa: F401
+    from app.playback.reading import chunks, file  # noqa: F401
     from app.recording import process, recording  # noqa: F401
     from reconstruction.mapping import mapper  # noqa: F401
 
@@ -85,8 +86,8 @@ def main() -> None:
                 os.dup2(errors, output)
             sys.argv[1:] = map(str, theirs)
             import_module(module).main()
-        for file in files:
-            os.close(file)
+        for number in files:
+            os.close(number)
 
 
 if __name__ == "__main__":

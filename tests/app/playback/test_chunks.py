@@ -9,8 +9,8 @@ import rerun as rr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.playback.chunks import complete_bytes
 from app.playback.playback import Playback
+from app.playback.reading.chunks import complete_bytes
 from app.terminal.errors import UsageError
 from tests.synthetic_run import write_run
 

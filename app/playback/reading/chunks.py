@@ -2,10 +2,7 @@
 
 import struct
 import warnings
-from collections import defaultdict
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from operator import attrgetter
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import NamedTemporaryFile
 from typing import BinaryIO
@@ -15,10 +12,10 @@ import pyarrow as pa  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from rerun.chunk import Chunk, RrdReader, StoreEntry
 
+from app.playback.reading.rows import STATIC, Row, Wanted
 from app.recording import entities
 from app.terminal.errors import UsageError
 
-STATIC = -1  # the frame of what belongs to no frame
 ROW_ID = "rerun.controls.RowId"
 
 STREAM_HEADER = 12  # bytes: RRF2, version, options
@@ -27,48 +24,8 @@ END_MESSAGE = 0
 LAST_KIND = 3
 
 
-@dataclass(frozen=True)
-class Row:
-    """One value of one component.
-
-    Attributes:
-        id: sorts in the order of logging.
-        frame: number of the frame in its source; STATIC for static data.
-        time_s: of the frame.
-        value: an array (n, ...) of the row's instances; of texts and records a list; of a blob its bytes.
-    """
-
-    id: bytes
-    frame: int
-    time_s: float
-    value: object
-
-
-@dataclass
-class Rows:
-    """Rows by entity and component, in the order of logging."""
-
-    found: dict[tuple[str, str], list[Row]] = field(default_factory=lambda: defaultdict(list))
-
-    def all(self, entity: str, component: str) -> list[Row]:
-        """Every row."""
-        return sorted(self.found.get((entity, component), []), key=attrgetter("id"))
-
-    def last(self, entity: str, component: str) -> dict[int, Row]:
-        """By frame: of several rows of a frame the one that was logged last."""
-        return {row.frame: row for row in self.all(entity, component)}
-
-    def static(self, entity: str, component: str) -> object:
-        """A static value.
-
-        Raises:
-            KeyError: there is none.
-        """
-        return self.last(entity, component)[STATIC].value
-
-
-class RecordingFile:
-    """A recording on disk; an iterable of its chunks, which are read one at a time.
+class ChunkFile:
+    """A recording on disk, read in this process; an iterable of its chunks, which are read one at a time.
 
     Args:
         path: the .rrd file.
@@ -100,16 +57,17 @@ class RecordingFile:
         except RuntimeError as error:
             raise UsageError(f"{self.path} is damaged ({error}): run again to make another") from error
 
-    def rows(self, wanted: Callable[[str, str], bool]) -> Rows:
-        """The rows of all wanted (entity, component); entities are named without a leading slash."""
-        rows = Rows()
+    def pieces(self, *wanted: Wanted) -> Iterator[tuple[str, str, list[Row]]]:
+        """Entity, component and rows of all wanted components; entities are named without a leading slash."""
         for chunk in self:
             entity = chunk.entity_path.lstrip("/")
+            of_entity = tuple(component for begin, component in wanted if entity.startswith(begin))
+            if not of_entity:
+                continue
             batch = chunk.to_record_batch()
             for component in batch.schema.names:
-                if wanted(entity, component):
-                    rows.found[entity, component] += column_rows(batch, component)
-        return rows
+                if component.startswith(of_entity):
+                    yield entity, component, column_rows(batch, component)
 
     def _open(self, path: Path) -> None:
         with warnings.catch_warnings():

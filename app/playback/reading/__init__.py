@@ -1,0 +1,1 @@
+"""Reading recordings row by row, in a process of its own."""
