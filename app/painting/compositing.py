@@ -10,6 +10,7 @@ from app.arrays import Array, Floats, Image, Mask
 from app.painting import edge, shading
 from app.painting.evidence import Moved
 from app.painting.occlusion import Occlusion, Tracked
+from app.painting.outline import Outline
 from app.painting.picture import Pyramid
 from app.painting.placement import Placement, extent
 from app.painting.raster import Rasteriser, SurfaceMap
@@ -49,9 +50,10 @@ class Compositor:
         self._reference_px = reference_px
         reach = extent(placement.outline, reference_px, mesh.faces, (w, h))
         self._corners = reach.quad if placement.corners is None else placement.corners
-        self._surface = Surface(reference_px, mesh, reach.quad, reach.region)
+        self._surface = Surface(reference_px, mesh, reach.quad, reach.region, sheet=reach.told)
         net = self._surface.net
         self._region = None if reach.region is None else cast(Mask, cv2.GaussianBlur(reach.region, (0, 0), EDGE_PX))
+        self._outline = Outline(self._surface.shape, first, net.nodes_px) if reach.told else None
         self._raster = Rasteriser(net.faces, net.nodes_px, (w, h), perspective=perspective)
         self._reference = shading.Reference(first)
         self._shade = np.ones((h // 2, w // 2), np.float32)
@@ -81,6 +83,8 @@ class Compositor:
         """
         points = self._surface.corrected(projection_px, observed_px)
         nodes, depths = self._surface.nodes(projection_px, depth, points, perspective=self._perspective)
+        if self._outline is not None:
+            nodes = self._surface.stretched(nodes, self._outline.border, self._outline.off(image, nodes))
         surface = self._mapped(nodes, depths)
         if surface is None:
             return image

@@ -40,10 +40,12 @@ class Extent:
     Attributes:
         quad: (4, 2) px a figure around it, along its axes, from its top left clockwise as the picture shows it.
         region: (H, W) 255 where it is; None: all of `quad`.
+        told: whether somebody has told that it has these four corners.
     """
 
     quad: Array
     region: Mask | None
+    told: bool = False
 
 
 def extent(outline: Array | None, reference_px: Array, faces: Indices, size: tuple[int, int]) -> Extent:
@@ -61,7 +63,7 @@ def extent(outline: Array | None, reference_px: Array, faces: Indices, size: tup
         if np.mean(inside) < ON_SURFACE:
             outline = None
     if outline is not None and len(outline) == 4:
-        return Extent(upright(outline), None)
+        return Extent(upright(outline), None, told=True)
     region = np.zeros(size[::-1], np.uint8)
     if outline is not None:
         cv2.fillPoly(region, [np.rint(outline).astype(np.int32)], 255)
@@ -144,7 +146,7 @@ def in_first_frame(
     """
     assert placement.corners is not None
     reach = extent(placement.outline, reference_px, mesh.faces, size)
-    surface = Surface(reference_px, mesh, reach.quad, None)
+    surface = Surface(reference_px, mesh, reach.quad, None, sheet=reach.told)
     projection_px, depth, observed_px = at
     points = surface.corrected(projection_px, observed_px)
     nodes, _ = surface.nodes(projection_px, depth, points, perspective=perspective)

@@ -13,9 +13,12 @@ from app.painting.shading import sampled
 from reconstruction.basis.mesh import Mesh
 
 NODES = 450  # of the net, about
+EDGE_PX, EDGE_TRUST = 14.0, 0.03  # points so near to the outline show what is behind the sheet, too
 BENDING = 0.02  # weight of the net's bending against the points
 TENSION = 0.3  # weight of the differences between nodes' offsets against the points' own
+STRETCHING = 0.01  # the same, where the border is drawn to the sheet's edge
 NEAREST = 0.05  # of the surface's mean depth: what goes on to behind the camera ends there
+USUAL_PX, FAR = 1.0, 4.0  # offset, and its multiple of the frame's median, at which a point is believed a quarter
 ROUNDS = 20  # of diffusing the points' offsets from the shape over their neighbours
 OUTLIER_PX = 1.5  # a point whose offset differs from its neighbours' by this counts half
 
@@ -37,26 +40,31 @@ class Surface:
         quad: (4, 2) px in the first frame, a figure around the surface, along its axes; the outline itself where that has
             four corners.
         region: (H, W) 255 where the surface is in the first frame, None: all of the figure.
+        sheet: whether the figure is the outline.
 
     Attributes:
         net: in the first frame.
+        shape: rows and columns of its nodes.
         region: as given.
     """
 
-    def __init__(self, reference_px: Array, mesh: Mesh, quad: Array, region: Mask | None) -> None:
+    def __init__(self, reference_px: Array, mesh: Mesh, quad: Array, region: Mask | None, *, sheet: bool = False) -> None:
         wide, tall = (float(np.linalg.norm(quad[k] - quad[0])) for k in (1, 3))
         side = float(np.sqrt(max(wide * tall, 1.0) / NODES))
         columns, rows = max(2, round(wide / side)), max(2, round(tall / side))
         to_net = homography(quad, np.array(((0, 0), (columns, 0), (columns, rows), (0, rows)), float))
         grid = np.stack(np.meshgrid(np.arange(columns + 1.0), np.arange(rows + 1.0)), axis=-1).reshape(-1, 2)
-        self.net = Net(mapped(grid, cast(Array, np.linalg.inv(to_net))), net_faces(columns, rows))
+        self.net, self._grid = Net(mapped(grid, cast(Array, np.linalg.inv(to_net))), net_faces(columns, rows)), grid
         self.region = region
         if region is not None:
             self.net = Net(self.net.nodes_px, faces_in(self.net, region))
-        self._to_net, self._shape_of_net = to_net, (rows + 1, columns + 1)
+        self._to_net, self.shape = to_net, (rows + 1, columns + 1)
         places = mapped(reference_px, to_net)
-        self._shape = Interpolation(places, (columns, rows), bends(columns + 1, rows + 1), BENDING)
-        self._offset = Interpolation(places, (columns, rows), steps(columns + 1, rows + 1), TENSION)
+        trust = np.where(beside(reference_px, quad), EDGE_TRUST, 1.0) if sheet else None
+        self._shape = Interpolation(places, (columns, rows), bends(columns + 1, rows + 1), BENDING, trust)
+        self._places = places
+        self._stretch: Interpolation | None = None
+        self._offset = Interpolation(places, (columns, rows), steps(columns + 1, rows + 1), TENSION, trust)
         self._averages = neighbour_averages(mesh, len(reference_px))
 
     def nodes(self, projection_px: Array, depth: Array, points_px: Array, *, perspective: bool) -> tuple[Array, Array]:
@@ -73,19 +81,36 @@ class Surface:
         far = np.maximum(shape[:, 2:3], NEAREST * float(weight.mean()))
         return np.asarray(shape[:, :2] / far + self._offset(points_px - projection_px)), shape[:, 3]
 
+    def stretched(self, nodes_px: Array, border: Indices, off: Array) -> Array:
+        """The nodes (q, 2) with those at the border (n,) moved by `off` (n, 2), where points hold it between them.
+
+        The first call says which are at the border.
+        """
+        if self._stretch is None:
+            rows, columns = self.shape
+            held = self._places[((self._places > 1.5) & (self._places < np.array((columns, rows)) - 2.5)).all(axis=1)]
+            places = np.concatenate([held, self._grid[border]])
+            self._stretch = Interpolation(places, (columns - 1, rows - 1), steps(columns, rows), STRETCHING)
+            self._held = len(held)
+        return np.asarray(nodes_px + self._stretch(np.concatenate([np.zeros((self._held, 2)), off])))
+
     def carried(self, values: Array, uv: Floats) -> Floats:
         """Values (q, 2) of the nodes, at places uv (h, w, 2) px of the first frame."""
-        net = cast(Floats, values.reshape(*self._shape_of_net, 2).astype(np.float32))
+        net = cast(Floats, values.reshape(*self.shape, 2).astype(np.float32))
         return sampled(net, cast(Floats, cv2.perspectiveTransform(uv, self._to_net)), cv2.BORDER_REPLICATE)
 
     def corrected(self, projection_px: Array, observed_px: Array) -> Array:
         """The vertices (p, 2) where they are seen; others are moved off the shape as their neighbours are."""
         visible: Flags = np.isfinite(observed_px[:, 0])
         seen = np.where(visible, (observed_px - projection_px) @ np.array((1, 1j)), 0.0)
-        off = seen
+        size = np.abs(seen)
+        # Points at the sheet's edge show half of what is behind it, and slide along.
+        usual = max(USUAL_PX, FAR * float(np.median(size[visible]))) if visible.any() else USUAL_PX
+        trust = visible / (1.0 + (size / usual) ** 2) ** 2
+        off = trust * seen
         for _ in range(ROUNDS):
             around = self._averages @ off
-            off = around + visible / (1.0 + (np.abs(seen - around) / OUTLIER_PX) ** 2) * (seen - around)
+            off = around + trust / (1.0 + (np.abs(seen - around) / OUTLIER_PX) ** 2) * (seen - around)
         return np.asarray(projection_px + np.column_stack([off.real, off.imag]))
 
 
@@ -112,9 +137,12 @@ class Interpolation:
         cells: columns and rows of the net.
         penalty: (n, q) what should be small of the nodes' values.
         weight: of its square against the points'.
+        trust: (p,) weights of the points; without it they are 1.
     """
 
-    def __init__(self, places: Array, cells: tuple[int, int], penalty: csr_array, weight: float) -> None:
+    def __init__(
+        self, places: Array, cells: tuple[int, int], penalty: csr_array, weight: float, trust: Array | None = None
+    ) -> None:
         columns, rows = cells
         cell = np.clip(np.floor(places), 0, np.array(cells) - 1).astype(np.int64)
         x, y = (places - cell).T
@@ -123,7 +151,7 @@ class Interpolation:
         share = np.column_stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y])
         at = (np.repeat(np.arange(len(places)), 4), number.ravel())
         bilinear = csr_array((share.ravel(), at), shape=(len(places), (columns + 1) * (rows + 1)))
-        self._to_nodes = csr_array(bilinear.T)
+        self._to_nodes = csr_array(bilinear.T if trust is None else bilinear.T @ diags_array(trust))
         normal = self._to_nodes @ bilinear + weight * (penalty.T @ penalty)
         self._factors = splu(csc_array(normal + 1e-9 * eye_array(normal.shape[0])))
 
@@ -151,6 +179,13 @@ def steps(columns: int, rows: int) -> csr_array:
 def differences(count: int) -> csr_array:
     """From numbers in a row to the steps between them (count − 1, count)."""
     return cast(csr_array, csr_array(diags_array([-1.0, 1.0], offsets=[0, 1], shape=(count - 1, count))))
+
+
+def beside(points: Array, quad: Array) -> Flags:
+    """Which points (n, 2) are near the outline (4, 2)."""
+    curve = quad.astype(np.float32)
+    far = [cv2.pointPolygonTest(curve, (float(x), float(y)), measureDist=True) for x, y in points]
+    return np.asarray(far) < EDGE_PX
 
 
 def net_faces(columns: int, rows: int) -> Indices:
