@@ -20,6 +20,7 @@ from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model
 
 PAPER = 0.95  # of a picture's full white is what bare paper shows
+WHITE_PX = 8  # of the first frame, for one of the map that says how bright white is there
 EDGE_PX = 0.7  # of the surface where its outline is not straight
 AROUND = 6  # half-resolution px around what is in front that are looked at for its edge
 
@@ -68,7 +69,9 @@ class Compositor:
         if not (covered & wanted).any():
             raise UsageError(f"--place is not on the surface, which is {told(reach.quad)} in the first frame")
         self._first_map, self._first = first_map, first
-        self._white = shading.white_level(first, covered)
+        across, down = np.meshgrid(*((np.arange(-(-side // WHITE_PX)) + 0.5) * WHITE_PX - 0.5 for side in (w, h)))
+        white = shading.quadratic(across, down, first.shape) @ shading.white_level(first, covered) / PAPER
+        self._white = np.clip(white, 0.2, 1.2).astype(np.float32)
         self._pyramid: tuple[Image, Pyramid] | None = None
 
     def paint(self, image: Image, picture: Image, projection_px: Array, depth: Array, observed_px: Array) -> Image:
@@ -106,7 +109,10 @@ class Compositor:
     def _moved(self, surface: SurfaceMap, nodes: Array) -> Moved:
         """The frame before, and how far the surface's pixels have come since."""
         frame, before = self._before or (None, nodes)
-        displacement = self._surface.carried((nodes - before) / 2, shading.halved(surface.uv))
+
+        def displacement() -> Floats:
+            return self._surface.carried((nodes - before) / 2, shading.halved(surface.uv))
+
         return Moved(frame, displacement, (surface.left // 2, surface.top // 2))
 
     def first(self, picture: Image) -> Image:
@@ -132,9 +138,8 @@ class Compositor:
         if self._pyramid is None or self._pyramid[0] is not picture:
             self._pyramid = (picture, Pyramid(picture, self._corners))
         layer = self._pyramid[1].sampled(surface.uv, surface.cover)
-        uv = shading.halved(surface.uv)
-        white = shading.quadratic(uv[..., 0], uv[..., 1], self._first.shape) @ self._white / PAPER
-        lit = light * np.clip(white, 0.2, 1.2)[..., None].astype(np.float32)
+        coarse = (shading.halved(surface.uv) + np.float32(0.5)) * np.float32(1 / WHITE_PX) - np.float32(0.5)
+        lit = light * shading.sampled(self._white, coarse, cv2.BORDER_REPLICATE)[..., None]
         share = surface.cover * np.float32(self._opacity)
         colour = cv2.cvtColor(layer, cv2.COLOR_BGRA2BGR)
         colour = cv2.multiply(colour, edge.enlarged(lit, (w, h)), dtype=cv2.CV_32F)

@@ -3,6 +3,7 @@
 Pixels are those of half the resolution.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -34,12 +35,12 @@ class Moved:
 
     Attributes:
         before: (H, W, 3) all of the frame before; None: there is none.
-        displacement: (h, w, 2) how far they have come, px of half the resolution.
+        displacement: gives how far they have come (h, w, 2), px of half the resolution.
         corner: x, y of the part in the picture.
     """
 
     before: Floats | None
-    displacement: Floats
+    displacement: Callable[[], Floats]
     corner: tuple[int, int]
 
     def mismatch(self, view: View) -> Floats:
@@ -49,7 +50,7 @@ class Moved:
             return np.zeros((h, w), np.float32)
         x, y = self.corner
         across, down = np.meshgrid(np.arange(x, x + w, dtype=np.float32), np.arange(y, y + h, dtype=np.float32))
-        places = np.dstack([across, down]) - self.displacement
+        places = np.dstack([across, down]) - self.displacement()
         one_map_for_both: Any = None
         seen = cv2.remap(self.before, places, one_map_for_both, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return cast(
