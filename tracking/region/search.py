@@ -14,10 +14,11 @@ from tracking.video import Frame
 MOST_FRAMES = 90  # are looked at
 TENTH = 0.9  # when the farthest tenth of what is in the middle has moved `FAR_ENOUGH`, that is enough
 MIDDLE = 0.5  # of a region that was drawn: nearer to its middle than to its border
-CUT = 0.3  # of the points seen just before: fewer, and it is another picture
+SEEN = 0.5  # of the points: fewer left say nothing of the others, or it is another picture
 CLEARER = 2.0  # times the contrast of the first frame: it was still fading in
 COMPARED = 20  # of those frames that are compared
 WINDOW_PX = 15
+WIDE_PX = 31  # leads points that do not come back: fast ones. It sees across borders, so the other has the last word
 FEWEST, POINTS = 50, 800
 LEFT_OUT = 0.03  # of the points: when no more are of something else, a region stays as it was given
 BLANK_FRAMES = 300  # without texture at the beginning, and no more are waited for
@@ -84,7 +85,7 @@ class Search:
         return self.frames >= MOST_FRAMES or self.moved_px > FAR_ENOUGH * max(self._region.shape)
 
     def add(self, image_bgr: Image) -> bool:
-        """Look at the next frame; False if it is another picture, or the same one much clearer: nothing of it is kept."""
+        """Look at the next frame; False if most points are lost, or it is much clearer: nothing of it is kept."""
         before, self._grays, last = self._grays, Grays.of(image_bgr), self._tracks[-1]
         moved, seen = np.full_like(last, np.nan), np.flatnonzero(np.isfinite(last[:, 0]))
         if len(seen):
@@ -93,7 +94,7 @@ class Search:
                 evened, also = followed(before.evened, self._grays.evened, last[seen])
                 there, good = (evened, also) if also.sum() > good.sum() else (there, good)
             moved[seen[good]] = there[good]
-            if good.sum() < CUT * len(seen) or self._contrast_now() > CLEARER * self._contrast:
+            if good.sum() < SEEN * len(last) or self._contrast_now() > CLEARER * self._contrast:
                 return False
         self._tracks.append(moved)
         self._way = np.fmax(self._way, np.linalg.norm(moved - self._tracks[0], axis=1))
@@ -115,9 +116,20 @@ class Search:
 
 def followed(before: Grays, now: Grays, points_px: Array) -> tuple[Array, Flags]:
     """Where points (n, 2) went, and whether that is known; without guides: what has no texture would go where they go."""
-    still, levels = np.zeros_like(points_px), levels_of(now) + 1
-    there, good = lucas_kanade(before.full, now.full, points_px, still, WINDOW_PX, levels, CONVERGED_PX)
-    return there, good & returned(before.full, now.full, points_px, there, still, WINDOW_PX, levels)
+
+    def follow(some: Array, guess: Array, window: int, levels: int) -> tuple[Array, Flags]:
+        there, good = lucas_kanade(before.full, now.full, some, guess, window, levels, CONVERGED_PX)
+        return there, good & returned(before.full, now.full, some, there, guess, window, levels)
+
+    levels = levels_of(now) + 1
+    there, good = follow(points_px, np.zeros_like(points_px), WINDOW_PX, levels)
+    lost = np.flatnonzero(~good)
+    if len(lost):
+        led, found = follow(points_px[lost], np.zeros((len(lost), 2)), WIDE_PX, levels)
+        lost, led = lost[found], led[found]
+    if len(lost):
+        there[lost], good[lost] = follow(points_px[lost], led - points_px[lost], WINDOW_PX, 0)
+    return there, good
 
 
 def search(frames: Iterable[Frame], region: Image) -> Found:

@@ -6,13 +6,16 @@ import numpy as np
 
 from reconstruction.arrays import Array
 from reconstruction.mapping.isometric.adjustment import by_part, with_focal
+from reconstruction.mapping.isometric.lengths import robust_lengths
+from reconstruction.mapping.isometric.nodes import edges_between
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 
-FACTORS = (0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8)  # of the focal length that are tried first
+FACTORS = (0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8, 2.3, 3.0)  # of the focal length that are tried first
 CLOSER = (0.93, 1.0, 1.08)
-RISE = 1.5  # times the least change of length, to which it must rise on both sides
+RISE = 1.3  # times the least change of length, to which it must rise on both sides
 ALIKE = 1.02  # times the least change of length, up to which the focal length assumed so far is as good
 FRAMES = 15  # those that differ most tell it
+EXACT = 1e-9  # change of length that is none
 ENOUGH = 1.1 * RISE  # ... and beyond which no focal length is tried on that side
 
 
@@ -24,25 +27,33 @@ class FocalSearch:
         focal_px: under which lengths change least.
         known: whether they change clearly more on both sides.
         tried_px: (k,) focal lengths, ascending.
-        strain_rms: (k,) change of length under each.
+        strain: (k,) typical change of length under each.
     """
 
     focal_px: float
     known: bool
     tried_px: Array
-    strain_rms: Array
+    strain: Array
+
+
+def typical_strain(sheet: IsometricSheet) -> float:
+    """Change of length of the typical edge: the geometric mean, so that the few that are on no sheet do not decide."""
+    edges = edges_between(sheet.nodes, sheet.values, sheet.camera).weighted(sheet.edge_weights)
+    change = robust_lengths(edges, edges.log_lengths(sheet.coefficients))[2]
+    return float(np.exp(np.log(np.maximum(change, EXACT)).mean()))
 
 
 def focal(sheet: IsometricSheet) -> FocalSearch:
     """Focal length by the change of length: least at the true one; the parabola through the three least, in log focal."""
-    tried: dict[float, IsometricSheet] = {}
+    tried: dict[float, tuple[IsometricSheet, float]] = {}
 
     def look(focal_px: float, start: IsometricSheet) -> IsometricSheet:
-        tried[focal_px] = with_focal(start, focal_px)
-        return tried[focal_px]
+        found = with_focal(start, focal_px)
+        tried[focal_px] = found, typical_strain(found)
+        return found
 
     def best() -> IsometricSheet:
-        return min(tried.values(), key=lambda one: one.strain_rms)
+        return min(tried.values(), key=lambda one: one[1])[0]
 
     f, middle = sheet.camera.focal_px, FACTORS.index(1.0)
     here = look(f, by_part(sheet, np.arange(min(FRAMES, len(sheet.coefficients)))))
@@ -50,13 +61,13 @@ def focal(sheet: IsometricSheet) -> FocalSearch:
         at = here  # outwards from the middle, each from the one before
         for factor in side:
             at = look(f * factor, at)
-            if at.strain_rms > ENOUGH * best().strain_rms:
+            if tried[f * factor][1] > ENOUGH * min(strain for _, strain in tried.values()):
                 break
     for factor in CLOSER:
         if (focal_px := best().camera.focal_px * factor) not in tried:
             look(focal_px, best())
     focals = np.array(sorted(tried))
-    strains = np.array([tried[focal_px].strain_rms for focal_px in focals])
+    strains = np.array([tried[focal_px][1] for focal_px in focals])
     k = int(strains.argmin())
     known = min(strains[:k].max(initial=0.0), strains[k + 1 :].max(initial=0.0)) > RISE * strains[k]
     if strains[focals == f][0] < ALIKE * strains[k]:
