@@ -1,6 +1,8 @@
 """Pictures as a recording stores them: frames as JPEG, the video file as it is, the mesh's texture."""
 
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Literal, cast
 
 import cv2
@@ -8,9 +10,11 @@ import numpy as np
 import rerun as rr
 
 from app.arrays import Array, Image, Indices
+from app.files.video_out import VideoSink, writable_video
 from app.recording.columns import Values
 from app.terminal.errors import UsageError
 from tracking.capture import Capture, pixel_aspect
+from tracking.video import Video
 
 JPEG_QUALITY = 75  # of a video that was compressed before; 85 looks the same and takes 1.4 times as much
 
@@ -22,20 +26,43 @@ def jpeg(image: Image) -> dict[str, Values]:
 
 
 def embedded_video(video: Path | None) -> tuple[rr.AssetVideo, Indices]:
-    """A video file as it is, and its frames' time stamps (F,) in nanoseconds.
+    """A video file, and its frames' time stamps (F,) in nanoseconds.
+
+    The file as it is; where it says that its pictures are to be turned, or its pixels not square, which viewers do not
+    know, a copy that is.
 
     Raises:
-        UsageError: not a file, not a container and codec that Rerun knows, or pixels that are not square.
+        UsageError: not a file, or not a container and codec that Rerun knows.
     """
     if video is None or not video.is_file():
         raise UsageError("--image video needs a video file as the source: use --image jpeg")
-    if pixel_aspect(cast(Capture, cv2.VideoCapture(str(video)))) != 1:
-        raise UsageError(f"the pixels of {video} are not square, which viewers do not know: use --image jpeg")
     try:
-        asset = rr.AssetVideo(path=video)
+        asset = rr.AssetVideo(path=video) if as_it_is(video) else upright(video)
         return asset, np.sort(np.asarray(asset.read_frame_timestamps_nanos(), np.int64))
     except (RuntimeError, ValueError, OSError) as error:
         raise UsageError(f"--image video cannot store {video} ({error}): use --image jpeg") from error
+
+
+def as_it_is(video: Path) -> bool:
+    """Whether a video's pictures are shown as they are stored."""
+    capture = cv2.VideoCapture(str(video))
+    try:
+        return capture.get(cv2.CAP_PROP_ORIENTATION_META) % 360 == 0 and pixel_aspect(cast(Capture, capture)) == 1
+    finally:
+        capture.release()
+
+
+def upright(video: Path) -> rr.AssetVideo:
+    """A copy of a video with its pictures as they are to be shown."""
+    with TemporaryDirectory() as folder, ExitStack() as files:
+        copy = Path(folder) / "upright.mp4"
+        frames = files.enter_context(Video(str(video)))
+        sink: VideoSink | None = None
+        for frame in frames:
+            sink = sink or files.enter_context(writable_video(copy, frame.image.shape[1::-1], frames.fps))
+            sink.write(frame.image, frame.time_s)
+        files.close()
+        return rr.AssetVideo(contents=copy.read_bytes(), media_type="video/mp4")
 
 
 def cropped(image: Image, points_px: Array) -> tuple[Image, Indices]:
