@@ -20,7 +20,7 @@ from app.terminal.exit_code import ExitCode
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary, print_rows
 
-README_TABLE = "reproduce"
+README_TABLE, FOOTAGE_TABLE = "reproduce", "holds-under"  # the second is the name of its experiment, too
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,8 @@ def reproduce(command: Reproduce, _: Progress) -> Reproduced:
     chosen = [experiment for experiment in CATALOG if not command.only or experiment.name in command.only]
     skipped = {e.name: absent for e in chosen if (absent := [f for f in e.files if not (command.data / f).is_file()])}
     ready = [experiment for experiment in chosen if experiment.name not in skipped]
+    if command.readme and any(experiment.name == FOOTAGE_TABLE for experiment in ready):
+        with_table(command.readme, FOOTAGE_TABLE, "")
     if not ready:
         raise UsageError(f"--data {command.data} has none of the files needed: {', '.join(needed(chosen))}")
     expected_s = sum(experiment.expected_s(effort) for experiment in ready)
@@ -79,6 +81,8 @@ def reproduce(command: Reproduce, _: Progress) -> Reproduced:
             interrupted = True
     if command.readme and not interrupted:
         put_table(command.readme, README_TABLE, report.headlines())
+        if any(experiment.name == FOOTAGE_TABLE for experiment in ready):
+            put_table(command.readme, FOOTAGE_TABLE, report.table(FOOTAGE_TABLE))
     return Reproduced(**report.as_words(), skipped=skipped, interrupted=interrupted, report=report.markdown_path)
 
 

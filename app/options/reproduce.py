@@ -22,6 +22,7 @@ Name = Literal[
     "paper",
     "talking-face",
     "hard-cases",
+    "holds-under",
 ]
 NAMES: tuple[str, ...] = get_args(Name)
 
@@ -44,11 +45,11 @@ class Reproduce(Json):
     """Folder for the report."""
     only: Annotated[tuple[Name, ...], tyro.conf.arg(metavar="NAME…")] = ()
     """Experiments to run, of: accuracy, peers, mode-counts, metrics, missing, basis-time, mode-shapes, organ, sample,
-    paper, talking-face, hard-cases; without it all."""
+    paper, talking-face, hard-cases, holds-under; without it all."""
     quick: bool = False
     """Fewer settings, one seed, fewer frames: for a first look."""
     readme: Path | None = None
-    """File whose table between two marker comments is replaced by the report's headlines."""
+    """File whose tables between marker comments are replaced: the report's headlines, and what footage it holds under."""
 
     def __post_init__(self) -> None:
         if not self.data.is_dir():

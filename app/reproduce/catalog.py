@@ -5,7 +5,6 @@ from app.reproduce.experiments import (
     accuracy,
     basis_time,
     footage,
-    hard_cases,
     metrics,
     missing,
     mode_counts,
@@ -13,6 +12,7 @@ from app.reproduce.experiments import (
     organ_run,
     peers,
 )
+from app.reproduce.experiments.robustness import hard_cases, holds_under
 
 CATALOG: tuple[Experiment, ...] = (
     accuracy.EXPERIMENT,
@@ -27,4 +27,5 @@ CATALOG: tuple[Experiment, ...] = (
     footage.PAPER,
     footage.TALKING_FACE,
     hard_cases.EXPERIMENT,
+    holds_under.EXPERIMENT,
 )

@@ -99,6 +99,11 @@ class Report:
         columns = ["data", "setting", "e3d %", "rest shape alone %", "others"]
         return markdown_table(columns, [[h["data"], h["setting"], h["e3d"], h["e3d_static"], h["others"]] for h in rows])
 
+    def table(self, name: str) -> str:
+        """The first table of an experiment that is in the report."""
+        first = self.experiments[name]["tables"][0]
+        return markdown_table(first["columns"], first["rows"])
+
     def _write(self, path: Path, text: str) -> None:
         with writable(path) as file:
             file.write(text.encode())

@@ -78,7 +78,11 @@ def surface_of(W: Array, group: Flags, grouped: Flags, region: Image) -> Surface
     own = group & (way > SHARED * carried)  # else it was not seen when the others moved
     motion = float(np.median(way[own]))
     other = ~group & (grouped | ((off > STRAY_PX) & (way < SHARED * carried)))
-    doubtful = ~own & ~other & ~region.all()  # in a region that somebody chose, points that were lost are as good
+    doubtful = ~own & ~other & ~region.all()  # in a region that somebody chose, points that were lost are as good ...
+    decided = np.flatnonzero(own | other)
+    distance = ((W[0][:, None] - W[0][decided]) ** 2).sum(axis=2)
+    beside = decided[np.argsort(distance, axis=1)[:, :BESIDE]]
+    doubtful &= own[beside].mean(axis=1) > SHARED  # ... where those beside them are on the surface
     return Surface(surface_mask(W[0], own | doubtful, other, region), own, other, motion)
 
 

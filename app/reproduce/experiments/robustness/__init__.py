@@ -1,0 +1,1 @@
+"""What is hard: made-up things and bad footage."""
