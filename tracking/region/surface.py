@@ -79,10 +79,8 @@ def surface_of(W: Array, group: Flags, grouped: Flags, region: Image) -> Surface
     motion = float(np.median(way[own]))
     other = ~group & (grouped | ((off > STRAY_PX) & (way < SHARED * carried)))
     doubtful = ~own & ~other & ~region.all()  # in a region that somebody chose, points that were lost are as good ...
-    decided = np.flatnonzero(own | other)
-    distance = ((W[0][:, None] - W[0][decided]) ** 2).sum(axis=2)
-    beside = decided[np.argsort(distance, axis=1)[:, :BESIDE]]
-    doubtful &= own[beside].mean(axis=1) > SHARED  # ... where those beside them are on the surface
+    if (grouped & ~group).sum() > BESIDE:
+        doubtful &= off <= np.maximum(astray_px(W, grouped & ~group)[0], STRAY_PX)  # ... unless they went as the others
     return Surface(surface_mask(W[0], own | doubtful, other, region), own, other, motion)
 
 
