@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay, QhullError
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices
 
-SLIVER_DEGREES = 5.0  # hull triangles with a smaller angle bridge a dent of the outline and are dropped
+SLIVER_DEGREES = 10.0  # triangles on the border with a smaller angle bridge a dent of the outline: nothing is seen there
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,24 @@ def triangulate(points: Array) -> Mesh:
     except QhullError as error:
         raise ReconstructionError("cannot make a mesh: the points lie on one line, or move at random") from error
     faces = triangulation.simplices.astype(np.int64)
-    on_hull = (triangulation.neighbors < 0).any(axis=1)
-    kept = faces[~(on_hull & (smallest_angle(points, faces) < np.deg2rad(SLIVER_DEGREES)))]
-    return mesh_from_faces(kept if np.unique(kept).size == len(points) else faces)
+    return mesh_from_faces(without_slivers(points, faces))
+
+
+def without_slivers(points: Array, faces: Indices) -> Indices:
+    """Triangles (m, 3) over points (p, 2), those on the border peeled off as long as they are slivers; no point is lost."""
+    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+    side = np.unique(sides, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    thin = np.flatnonzero(smallest_angle(points, faces) < np.deg2rad(SLIVER_DEGREES))
+    kept = np.ones(len(faces), np.bool_)
+    while True:
+        users, sharers = np.bincount(faces[kept].ravel(), minlength=len(points)), np.bincount(side[kept].ravel())
+        thin = thin[kept[thin]]
+        out = thin[(sharers[side[thin]] == 1).any(axis=1) & (users[faces[thin]] > 1).all(axis=1)]
+        if not len(out):
+            return faces[kept]
+        first = np.full(len(points), len(faces))
+        np.minimum.at(first, faces[out], out[:, None])  # one at a time around each point: its last one stays
+        kept[out[(first[faces[out]] == out[:, None]).all(axis=1)]] = False
 
 
 def smallest_angle(points: Array, faces: Indices) -> Array:

@@ -51,6 +51,20 @@ def test_slivers_that_bridge_a_dent_are_dropped() -> None:
     assert np.unique(faces).size == len(points)
 
 
+def test_slivers_behind_slivers_are_dropped_too() -> None:
+    dent = np.array([[0.0, 0], [2, 0.3], [5, 0.5], [8, 0.3], [10, 0]])  # bridged by one wide triangle and two thin ones
+    points = np.concatenate([dent, [[10, 6], [5, 6], [0, 6]]])
+    faces = np.sort(triangulate(points).faces)
+    assert not (faces < len(dent)).all(axis=1).any()
+    assert np.unique(faces).size == len(points)
+
+
+@given(SEEDS)
+def test_no_point_is_lost_with_the_slivers(rng: np.random.Generator) -> None:
+    points = spread(rng, 40).T * (1.0, 1e-3)
+    assert np.unique(triangulate(points).faces).size == len(points)
+
+
 def test_smallest_angle_of_known_triangles() -> None:
     points = np.array([[0.0, 0], [1, 0], [0, 1], [0.5, np.sqrt(3) / 2], [2, 0]])
     angles = np.rad2deg(smallest_angle(points, np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])))
