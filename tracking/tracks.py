@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracking import Array, Flags, Indices, TrackingError
-from tracking.extent import check_extent
+from tracking.extent import LARGEST, check_extent
 
 LARGEST_BYTES = 4 * 2**30  # of arrays in a file
 SKEW = 1e-3  # of the focal length: more is no ordinary camera
@@ -223,12 +223,13 @@ def _check_truth(S: Array, frames: Indices, points: int) -> None:
         raise _wrong_shape("S_gt", S, f"(true frames, 3, {points}) as there are {points} points")
     if not np.isfinite(S).all():
         raise TrackingError("S_gt has entries that are not finite")
-    if (np.ptp(S, axis=2).max(axis=1) <= 0).any():
-        raise TrackingError(
-            f"S_gt has a shape without extent: that of frame {frames[np.ptp(S, axis=2).max(axis=1) <= 0][0]}"
-        )
+    if np.abs(S).max() > LARGEST:
+        raise TrackingError(f"S_gt has values beyond {LARGEST:g}")
     if frames.shape != (len(S),):
         raise _wrong_shape("gt_frames", frames, f"({len(S)},) as S_gt has {len(S)} shapes")
+    still = np.ptp(S, axis=2).max(axis=1) < 1 / LARGEST
+    if still.any():
+        raise TrackingError(f"S_gt has a shape without extent: that of frame {frames[still][0]}")
     if frames[0] < 0 or np.any(np.diff(frames) <= 0):
         raise TrackingError("gt_frames must ascend from 0 or later, each frame once")
 

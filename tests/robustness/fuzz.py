@@ -1,7 +1,9 @@
-"""Damaged inputs for every command: python -m tests.robustness.fuzz [CASES]  (300 by default, 3 minutes on two cores).
+"""Damaged inputs for every command: python -m tests.robustness.fuzz [KIND [FIRST:STOP]]
+
+Kinds are npz, video, rrd, mesh, texture and command; all of them and 0:1000 by default, an hour on two cores.
 
 A case is good when the command ends by itself within two minutes and 2 GB, with exit code 0 or 2, no traceback, one line on
-stderr if the code is 2, and all other files as they were. Cases follow from their numbers.
+stderr if the code is 2, and all other files as they were. Cases follow from their kinds and numbers.
 """
 
 import json
@@ -12,18 +14,21 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from app.environment import environment as completed_environment
+from tests.robustness.damage import bytes_changed, command_line, numbers_changed, picture_changed, words_changed
+
+Damage = Callable[[bytes, np.random.Generator], tuple[str, bytes]]
 
 ROOT = Path(__file__).parents[2]
-CASES, WORKERS = 300, 2
+CASES, WORKERS = 1000, 2
 SECONDS, BYTES = 120.0, 2 * 2**30
-RUN = "--points 60 --modes 5 --frames :14 --rest-shape plane --bootstrap-frames 4 --no-final-pass --out out.rrd"
+RUN = "--points 60 --modes 5 --frames :14 --rest-shape plane --bootstrap-frames 4 --no-final-pass --jobs 1 --out out.rrd"
 COMMANDS = {
     "video.mp4": [
         f"run FILE {RUN}",
@@ -50,59 +55,44 @@ COMMANDS = {
     "sheet.obj": [f"run video.mp4 --rest-shape FILE {RUN.replace('--rest-shape plane', '')}"],
     "sheet.glb": [f"run video.mp4 --rest-shape FILE {RUN.replace('--rest-shape plane', '')}"],
 }
-MAGIC = {
-    "mp4": b"\0\0\0\x18ftypmp42", "webm": b"\x1aE\xdf\xa3", "png": b"\x89PNG\r\n\x1a\n", "npz": b"PK\x03\x04",
-    "rrd": b"RRF2", "glb": b"glTF\x02\0\0\0", "obj": b"v 1e999 nan 3\nf 1 2 -7\n",
-}  # fmt: skip
+KINDS: dict[str, tuple[list[str], list[Damage]]] = {  # files, and what is done to them beside changing bytes
+    "npz": (["tracks.npz", "truth.npz"], [numbers_changed]),
+    "video": (["video.mp4", "video.webm"], []),
+    "rrd": (["run.rrd"], []),
+    "mesh": (["sheet.obj", "sheet.glb"], [words_changed]),
+    "texture": (["picture.png"], [picture_changed]),
+}
 
 
 @dataclass(frozen=True)
 class Case:
     """One damaged file and what is done with it."""
 
+    kind: str
     number: int
     name: str
     damage: str
     arguments: list[str]
 
 
-def damaged(data: bytes, rng: np.random.Generator, suffix: str) -> tuple[str, bytes]:
-    """What was done to a file, and what it is now."""
-    array = np.frombuffer(data, np.uint8).copy()
-    kind = rng.choice(["flips", "head flips", "cut", "zeros", "noise", "wrong header", "other kind", "twice", "empty"])
-    if kind in ("flips", "head flips"):
-        reach = len(array) if kind == "flips" else min(len(array), 400)
-        for _ in range(int(rng.choice([1, 4, 30, 300]))):
-            array[rng.integers(reach)] ^= np.uint8(1 << rng.integers(8))
-    elif kind == "cut":
-        array = array[: rng.integers(len(array))]
-    elif kind in ("zeros", "noise"):
-        start = int(rng.integers(len(array)))
-        stop = start + int(rng.integers(1, len(array) // 3))
-        array[start:stop] = 0 if kind == "zeros" else rng.integers(0, 256, len(array[start:stop]))
-    elif kind == "wrong header":
-        other = np.frombuffer(rng.choice(sorted(MAGIC.values())), np.uint8)
-        array[: len(other)] = other[: len(array)]
-    elif kind == "other kind":
-        array = np.concatenate([np.frombuffer(MAGIC[suffix], np.uint8), rng.integers(0, 256, 3000).astype(np.uint8)])
-    elif kind == "twice":
-        array = np.concatenate([array, array[len(array) // 2 :]])
-    else:
-        array = array[:0]
-    return str(kind), array.tobytes()
-
-
-def make(number: int, samples: Path, folder: Path) -> Case:
-    """The case of that number, with its files in a folder of its own."""
-    rng = np.random.default_rng(number)
+def make(kind: str, number: int, samples: Path, folder: Path) -> Case:
+    """The case of that kind and number, with its files in a folder of its own."""
+    rng = np.random.default_rng([*kind.encode(), number])
     for sample in samples.iterdir():
         os.link(sample, folder / sample.name)
-    name = sorted(COMMANDS)[number % len(COMMANDS)]
-    kind, data = damaged((samples / name).read_bytes(), rng, name.split(".")[1])
+    if kind == "command":
+        return Case(kind, number, "", "", command_line(rng))
+    files, damages = KINDS[kind]
+    name = files[number % len(files)]
+    suffix, data = name.split(".")[1], (samples / name).read_bytes()
+    if damages and suffix != "glb" and rng.random() < 0.6:
+        damage, data = damages[0](data, rng)
+    else:
+        damage, data = bytes_changed(data, rng, suffix)
     bad = f"bad_{name}"
     (folder / bad).write_bytes(data)
     line = str(rng.choice(COMMANDS[name]))
-    return Case(number, name, kind, [bad if word == "FILE" else word for word in line.split()])
+    return Case(kind, number, name, damage, [bad if word == "FILE" else word for word in line.split()])
 
 
 def complaint(case: Case, folder: Path, before: dict[str, bytes]) -> str | None:
@@ -159,26 +149,30 @@ def carry_out(case: Case, folder: Path, errors: Path) -> None:
         os._exit(code)
 
 
-def work(samples: Path, first: int, stop: int) -> Iterator[dict[str, object]]:
+def work(samples: Path, kind: str, first: int, stop: int) -> Iterator[dict[str, object]]:
     """Every `WORKERS`-th case, one after another."""
     import app.commands.export
     import app.commands.modes
     import app.commands.retexture
     import app.commands.review
     import app.pipeline.evaluate
-    import app.pipeline.session  # noqa: F401
+    import app.pipeline.session
+    import app.processes.child
+    from tests.app import forked
 
+    app.processes.child.started = forked.started  # type: ignore[assignment]
+    forked.loaded()
     kept = {path.name: path.read_bytes() for path in samples.iterdir()}
     for number in range(first, stop, WORKERS):
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name, "case")
             folder.mkdir()
-            case = make(number, samples, folder)
+            case = make(kind, number, samples, folder)
             before = kept | {path.name: path.read_bytes() for path in folder.iterdir()}
             started = time.monotonic()
             wrong = complaint(case, folder, before)
             yield {
-                "case": number, "file": case.name, "damage": case.damage, "command": " ".join(case.arguments),
+                "kind": kind, "case": number, "file": case.name, "damage": case.damage, "command": " ".join(case.arguments),
                 "seconds": time.monotonic() - started, "wrong": wrong,
             }  # fmt: skip
 
@@ -216,7 +210,7 @@ def make_samples(folder: Path) -> None:
     mesh.export(folder / "sheet.glb")
 
 
-def fuzz(cases: range) -> list[dict[str, object]]:
+def fuzz(kind: str, cases: range) -> list[dict[str, object]]:
     """Those of the cases with a complaint; workers share them."""
     with tempfile.TemporaryDirectory() as name:
         samples = Path(name)
@@ -224,7 +218,7 @@ def fuzz(cases: range) -> list[dict[str, object]]:
         environment = completed_environment() | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
         command = [sys.executable, "-m", "tests.robustness.fuzz", "--worker", str(samples)]
         workers = [
-            subprocess.Popen([*command, *numbers], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
+            subprocess.Popen([*command, kind, *numbers], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
             for numbers in ((str(cases.start + k), str(cases.stop)) for k in range(WORKERS))
         ]
         results = [json.loads(line) for worker in workers for line in worker.communicate()[0].splitlines()]
@@ -234,11 +228,12 @@ def fuzz(cases: range) -> list[dict[str, object]]:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--worker"]:
-        for result in work(Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])):
+        for result in work(Path(sys.argv[2]), sys.argv[3], int(sys.argv[4]), int(sys.argv[5])):
             sys.stdout.write(json.dumps(result) + "\n")
             sys.stdout.flush()
         sys.exit()
-    bad = fuzz(range(int(sys.argv[1]) if sys.argv[1:] else CASES))
+    first, _, stop = (sys.argv[2] if sys.argv[2:] else f"0:{CASES}").partition(":")
+    bad = [one for kind in (sys.argv[1:2] or [*KINDS, "command"]) for one in fuzz(kind, range(int(first), int(stop)))]
     for one in bad:
         sys.stdout.write(json.dumps(one, indent=1) + "\n")
     sys.stdout.write(f"{len(bad)} cases went wrong\n")
