@@ -117,7 +117,7 @@ def as_rows(facts: Facts) -> dict[str, str]:
         "phases": ", ".join(f"{p['phase']} {p['first']}–{p['last']}" for p in facts.phases),
         "rest shape": known(facts.rest_shape) + (f": {note}" if note else ""),
         "deformation": f"{known(facts.deformation)}, {facts.modes} modes of {known(facts.metric)} distances",
-        "points": f"{facts.points}, {facts.losses} losses, {facts.recoveries} recoveries",
+        "points": f"{facts.points}, lost {facts.point_losses} times, seen again {facts.point_recoveries} times",
         "visible": f"{share['mean']:.1%} (lowest {share['min']:.1%}, last frame {share['last']:.1%})",
         "reprojection, px": named(error, ("mean", "median", "p95", "max", "rms"), "{:.3g}") if error else "",
         "worst frames, RMS px": ", ".join(f"{w['frame']} ({w['rms_px']:.2f})" for w in facts.worst_frames),

@@ -51,8 +51,8 @@ class Facts(Summary):
     metric: object
     modes: object
     visible_share: Mapping[str, float]
-    losses: int
-    recoveries: int
+    point_losses: int
+    point_recoveries: int
     reprojection_px: Mapping[str, float] | None
     worst_frames: Sequence[Row]
     stage_ms: Mapping[str, Mapping[str, float]]
@@ -100,8 +100,8 @@ def facts(playback: Playback, measured: Measures) -> Facts:
             "min": float(measured.visible_share.min()),
             "last": float(measured.visible_share[-1]),
         },
-        losses=int(measured.lost.sum()),
-        recoveries=int(measured.recovered.sum()),
+        point_losses=int(measured.lost.sum()),
+        point_recoveries=int(measured.recovered.sum()),
         reprojection_px=statistics(seen) | rms if seen.size else None,
         worst_frames=worst_frames(frames, playback.times_s, measured.rms_px),
         stage_ms={name: statistics(values[np.isfinite(values)]) for name, values in stages if np.isfinite(values).any()},

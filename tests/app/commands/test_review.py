@@ -60,7 +60,7 @@ def test_json(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         {"phase": "tracking", "first": 2, "last": FRAMES - 1},
     ]
     assert (facts["points"], facts["modes"]) == (48, 4)
-    assert (facts["losses"], facts["recoveries"]) == (6 * HIDDEN, 5 * HIDDEN)
+    assert (facts["point_losses"], facts["point_recoveries"]) == (6 * HIDDEN, 5 * HIDDEN)
     assert facts["visible_share"] == pytest.approx({"mean": 5 / 6, "min": 2 / 3, "last": 2 / 3})
     assert facts["reprojection_px"] == pytest.approx(
         dict.fromkeys(("mean", "median", "p95", "max", "rms"), ERROR_PX), abs=1e-4
@@ -122,8 +122,8 @@ def test_comparison(path: Path, without_model: Path, capsys: pytest.CaptureFixtu
     assert both[1]["reprojection_px"] is None
     review(Review(path, without_model), Progress()).print_table()
     lines = [line for line in capsys.readouterr().out.splitlines() if "48, " in line]
-    assert "48, 96 losses" in lines[0]
-    assert "48, 32 losses" in lines[0]
+    assert "48, lost 96 times" in lines[0]
+    assert "48, lost 32 times" in lines[0]
 
 
 def test_recordings_of_equal_name_are_told_apart(path: Path) -> None:
