@@ -2,6 +2,7 @@
 
 import os
 import re
+import shlex
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -142,7 +143,9 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
     if "://" in source:
         capture = open_url(source)
         if not cast(cv2.VideoCapture, capture).isOpened():
-            raise TrackingError(f"{source} cannot be decoded; check the address")
+            raise TrackingError(
+                f"{source} cannot be decoded; check the address, or download it: its server may not serve parts of files"
+            )
         return squared(capture, source, log) if announced_frames(capture) else Reconnecting(source, capture, closing, log)
     path = Path(source)
     if re.search(r"%0?\d*d", source) and not path.exists():
@@ -153,6 +156,7 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
         raise TrackingError(f"no video file {source}; check the path")
     if not os.access(path, os.R_OK):
         raise TrackingError(f"{source} cannot be read: permission denied")
+    check_progressive(source)
     file = cv2.VideoCapture(source)
     if not file.isOpened():
         raise TrackingError(f"{source} cannot be decoded; it is not a video, or it is damaged or cut off")
@@ -170,6 +174,34 @@ def times_rise(source: str) -> bool:
         times.append(capture.get(cv2.CAP_PROP_POS_MSEC))
     capture.release()
     return bool((np.diff(times) > 0).all())
+
+
+def check_progressive(source: str) -> None:
+    """Check that OpenCV makes pictures of a file: of interlaced frames some give the same memory again and again.
+
+    Raises:
+        TrackingError: it does not.
+    """
+    capture = cv2.VideoCapture(source)
+    first, second = (capture.read()[1] for _ in range(2))
+    capture.release()
+    if first is None or second is None or not np.array_equal(first, second) or not interlaced(source):
+        return
+    raise TrackingError(
+        f"{source} is interlaced video, which OpenCV {cv2.__version__} does not decode; convert it: "
+        f"ffmpeg -i {shlex.quote(source)} -vf bwdif -c:v libx264 -crf 18 converted.mp4"
+    )
+
+
+def interlaced(source: str) -> bool:
+    """Whether the first frame of a file says so."""
+    import av  # few come here
+
+    try:
+        with av.open(source) as file:
+            return next(file.decode(video=0)).interlaced_frame
+    except (av.FFmpegError, StopIteration, IndexError):
+        return False
 
 
 def is_camera(source: str) -> bool:

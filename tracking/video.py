@@ -15,7 +15,15 @@ import cv2
 import numpy as np
 
 from tracking import Image, TrackingError
-from tracking.capture import Log, Reconnecting, announced_frames, as_bgr, is_camera, open_capture, times_rise
+from tracking.capture import (
+    Log,
+    Reconnecting,
+    announced_frames,
+    as_bgr,
+    is_camera,
+    open_capture,
+    times_rise,
+)
 
 DEFAULT_FPS = 30.0  # of sources that do not tell
 DECODE_AHEAD = 4  # frames waiting in the queue: enough to hide decoding, little memory
@@ -231,6 +239,10 @@ class Video:
             return TrackingError(
                 f"{self.source} is AV1 video, which OpenCV {cv2.__version__} does not decode; convert it: "
                 f"ffmpeg -i {shlex.quote(self.source)} -c:v libx264 -crf 18 converted.mp4"
+            )
+        if "://" in self.source:
+            return TrackingError(
+                f"{self.source} gives no frame: it is no video, or its server does not serve parts of files; download it"
             )
         named = f" (codec {codec})" if codec.isprintable() and codec else ""
         return TrackingError(f"{self.source} has no frame that can be decoded{named}; convert it to H.264 with ffmpeg")
