@@ -124,6 +124,7 @@ def write_glb(playback: Playback, out: Path, color: Literal["picture", "strain",
         scale=scale,
         Lambda=held(playback.estimates.Lambda),
         field_of_view=view,
+        unit_m=1e-3 if playback.unit == "millimetres" else None,
         colors=None if color == "picture" else greatest(playback, color),
     )
     with writable(out) as file:

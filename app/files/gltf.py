@@ -50,6 +50,7 @@ class MovingMesh:
         Lambda: (F, 3, r) px.
         field_of_view: vertical angle in radians and width / height of the picture; None for an orthographic camera.
         colors: (p, 3) of the vertices, 0 … 1 linear, instead of the picture; None for that.
+        unit_m: metres in one of the unit that lengths above are in, if that is known.
     """
 
     basis: ModalBasis
@@ -63,6 +64,7 @@ class MovingMesh:
     Lambda: Array
     field_of_view: tuple[float, float] | None = None
     colors: Array | None = None
+    unit_m: float | None = None
 
 
 def glb(moving: MovingMesh, name: str = "surface") -> bytes:
@@ -138,7 +140,9 @@ def morph_targets(moving: MovingMesh) -> tuple[Array, Array, list[str], list[flo
 
 
 def unit_m(moving: MovingMesh) -> float:
-    """Metres per pixel, so that the rest shape is LENGTH_M long."""
+    """Metres in a unit of length: as is known, else so that the rest shape is LENGTH_M long."""
+    if moving.unit_m is not None:
+        return moving.unit_m
     along = moving.basis.Phi[:, 0] @ moving.basis.rest
     return LENGTH_M / max(float(np.ptp(along)), 1e-9)
 

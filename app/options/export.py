@@ -16,7 +16,8 @@ class Export(Json, Overwrite, Online):
 
     Formats:
       glb    animated mesh with texture for Blender and every glTF viewer: the modes are morph targets. y up, right-handed;
-             the rest shape is 1 m long, its first place the origin; time 0 is the first frame
+             the rest shape is 1 m long, or as --size-mm of the run had it; its first place is the origin, time 0 the
+             first frame
       obj    a folder with frame_000123.obj for each frame, one material and texture; axes: --axes
       ply    the same as PLY
       csv    a folder: points.csv (seen, projected, in 3-D), frames.csv (pose and camera path), lambda.csv, mesh.csv

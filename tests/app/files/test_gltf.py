@@ -181,3 +181,11 @@ def test_neighbouring_quaternions_have_one_sign(tmp_path, moving):
     file = written(tmp_path, replace(moving, quaternion=moving.quaternion * signs))
     rotations = file.accessor(file.channels["rotation"].output)
     assert (np.sum(rotations[1:] * rotations[:-1], axis=1) > 0.5).all()
+
+
+def test_a_known_unit_is_in_true_metres(tmp_path, moving):
+    told, free = (written(tmp_path, replace(moving, unit_m=unit)).gltf.nodes[0] for unit in (1e-3, None))
+    assert told.scale == [1e-3] * 3
+    along = moving.basis.Phi[:, 0] @ moving.basis.rest
+    assert free.scale == pytest.approx([1 / np.ptp(along)] * 3)
+    assert np.array(told.translation) / 1e-3 == pytest.approx(np.array(free.translation) / free.scale[0])
