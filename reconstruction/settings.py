@@ -11,6 +11,7 @@ MetricChoice = Literal["auto", Metric]
 Deformation = Literal["auto", "bending", "stretching", "general", "inextensible"]
 RecoveredRestShape = Literal["auto", "rigid", "plane"]
 USUAL_MODES = 20
+MORE_MODES = 40  # of what deforms and is seen well
 PriorName = Literal["rest", "smoothness", "rotation", "scale", "inextensibility"]
 
 

@@ -17,7 +17,7 @@ from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, select
 from reconstruction.mapping.solid.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
-from reconstruction.settings import USUAL_MODES
+from reconstruction.settings import MORE_MODES, USUAL_MODES
 from reconstruction.state import State
 
 FEWEST_KEYFRAMES = 6
@@ -166,7 +166,8 @@ def sheet_map(camera: Camera, found: IsometricSheet, evidence: Evidence, *, esti
     s = found.camera.focal_px / (unit_px * origin[:, 2])
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, (s * unit_px)[:, None] * origin[:, :2])
     note = f"sheet from {len(shapes)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
-    return Map(RestShape("isometric", motion, note), camera, found, unit_px, evidence=evidence)
+    # Its shapes are smooth and go by lengths: there is no noise that more modes would fit, and fewer cut off its bends.
+    return Map(RestShape("isometric", motion, note), camera, found, unit_px, MORE_MODES, evidence=evidence)
 
 
 def medoid(shapes: Array) -> int:

@@ -8,9 +8,8 @@ from reconstruction.basis.modes import modal_basis, principal_axes
 from reconstruction.camera import Camera
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.solid import Solid
-from reconstruction.settings import USUAL_MODES
+from reconstruction.settings import MORE_MODES, USUAL_MODES
 
-MORE_MODES = 40
 COMPARED = 0.8  # of the points: no more modes can be compared
 BETTER = 0.97  # times what the usual modes leave over: less than that is worth the time
 
