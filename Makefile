@@ -50,6 +50,7 @@ wheel: .venv/ready
 # Those of the README, in docs/.
 pictures: demo
 	$(BIN)/python -m docs.pictures
+	$(BIN)/python -m docs.moving
 
 # By the environment, since pip then pins what builds the package, too.
 .venv/ready: pyproject.toml constraints.txt
