@@ -19,6 +19,7 @@ GUIDE_WINDOWS_PX = (11, 31)  # of the half picture; the second for those that do
 GUIDE_LEVELS = 3  # halvings of a half picture 320 px wide
 NEAREST_GUIDES = 8  # guides whose median motion a point starts from
 FEW_GUIDES = 0.7  # of the guides: come fewer back, the light may have changed
+LIGHT = 0.15  # the usual change of brightness at a guide, as a share: noise makes up to 0.1 of it, more is light
 EVENED_PX = 31  # side of the squares over which light is evened out: smaller than bands of light, larger than a window
 EVENED_NOISE = 4.0  # grey levels of contrast, below which there is nothing to be evened
 GUESSED_PX = 1.0  # what ends so near to where its guides went needs not come back
@@ -85,9 +86,9 @@ class Flow:
         seen = np.flatnonzero(np.isfinite(points_px[:, 0]))
         if len(seen) == 0:  # OpenCV raises
             return moved
-        motion, share = self._guess(before, now, points_px)
-        if share < FEW_GUIDES:  # a change of light is no motion
-            its_motion, its_share = self._guess(before.evened, now.evened, points_px)
+        motion, share, light = self._guess(before, now, points_px)
+        if share < FEW_GUIDES or light > LIGHT:  # a change of light is no motion
+            its_motion, its_share, _ = self._guess(before.evened, now.evened, points_px)
             if its_share >= FEW_GUIDES:
                 before, now, motion = before.evened, now.evened, its_motion
         motion, levels = motion[seen], 0
@@ -100,10 +101,10 @@ class Flow:
         moved[seen[good]] = there[good]
         return moved
 
-    def _guess(self, before: Grays, now: Grays, points_px: Array) -> tuple[Array, float]:
+    def _guess(self, before: Grays, now: Grays, points_px: Array) -> tuple[Array, float, float]:
         """The median motion of the guides nearest to each point in the reference frame: (P, 2); NaN if they are few.
 
-        And the share of the guides that came back.
+        And the share of the guides that came back, and by how much their brightness has changed, as a share: the median.
         """
         levels = levels_of(now)
         guides = self._order[np.isfinite(points_px[self._order, 0])][:GUIDES]
@@ -115,16 +116,35 @@ class Flow:
             if len(left):
                 moved[left], found = lucas_kanade(before.half, now.half, start[left], still, window, levels, CONVERGED_PX)
                 good[left] = found & returned(before.half, now.half, start[left], moved[left], still, window, levels)
+        light = change_of_light(before.half, now.half, start[good], moved[good])
         guides, motion = guides[good], 2 * (moved - start)[good]
         if len(guides) < NEAREST_GUIDES:
-            return np.full_like(points_px, np.nan), 0.0
+            return np.full_like(points_px, np.nan), 0.0, 0.0
         if not np.array_equal(guides, self._guides):  # seldom
             nearest = cv2.batchDistance(
                 self._reference, self._reference[guides], cv2.CV_32F, normType=cv2.NORM_L2SQR, K=NEAREST_GUIDES
             )[1]
             self._guides, self._nearest = guides, np.asarray(nearest, np.int64)
         middle = slice(NEAREST_GUIDES // 2 - 1, NEAREST_GUIDES // 2 + 1)
-        return cast(Array, np.sort(motion.T[:, self._nearest], axis=2)[:, :, middle].mean(axis=2).T), float(good.mean())
+        return (
+            cast(Array, np.sort(motion.T[:, self._nearest], axis=2)[:, :, middle].mean(axis=2).T),
+            float(good.mean()),
+            light,
+        )
+
+
+def change_of_light(before: Image, now: Image, start: Array, there: Array) -> float:
+    """By how much points (n, 2) are brighter or darker where they went (n, 2), as a share: the median; 0 of none."""
+    if len(start) == 0:
+        return 0.0
+    old, new = (
+        image[
+            np.rint(at[:, 1]).astype(int).clip(0, image.shape[0] - 1),
+            np.rint(at[:, 0]).astype(int).clip(0, image.shape[1] - 1),
+        ]
+        for image, at in ((before, start), (now, there))
+    )
+    return float(np.median(np.abs(np.log((new + 8.0) / (old + 8.0)))))  # what is black has no share
 
 
 def levels_of(grays: Grays) -> int:

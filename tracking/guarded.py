@@ -179,8 +179,12 @@ def same_background(before_bgr: Image, now_bgr: Image, surface_px: Array) -> boo
     hull = cv2.convexHull(surface_px[np.isfinite(surface_px).all(axis=1)].astype(np.float32).reshape(-1, 1, 2))
     cv2.fillConvexPoly(surface, np.rint(hull).astype(np.int32), (255,))
     before, now, inside = (
-        cv2.resize(image, CELLS, interpolation=cv2.INTER_AREA) for image in (before_bgr, now_bgr, surface)
+        cv2.resize(image, CELLS, interpolation=cv2.INTER_AREA).astype(np.float64)
+        for image in (before_bgr, now_bgr, surface)
     )
     around = inside == 0
-    change = np.abs(before.astype(np.float64) - now).max(axis=2)[around]
+    if not around.any():
+        return False
+    gain = np.median(now[around] + 1) / np.median(before[around] + 1)  # light may have changed
+    change = np.abs(before * gain - now).max(axis=2)[around]
     return around.mean() > LEAST_BACKGROUND and bool(np.mean(change < CELL_CHANGE) > SAME_CELLS)

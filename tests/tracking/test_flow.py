@@ -1,6 +1,7 @@
 import itertools
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,6 +21,15 @@ def test_follows_a_shift(dx: float, dy: float) -> None:
     now = moved(BEFORE.full[..., None].repeat(3, axis=2), lambda p: p - [dx, dy])
     error = np.linalg.norm(FLOW.follow(BEFORE, Grays.of(now), POINTS) - POINTS - [dx, dy], axis=1)
     assert np.mean(error < 0.2) > 0.9
+
+
+@pytest.mark.parametrize("light", ["brighter", "darker", "bands"])
+def test_follows_through_a_change_of_light(light: str) -> None:
+    rows = 1 + 0.35 * np.sin(np.arange(SIZE[1]) / 25)[:, None, None]
+    factor = {"brighter": 1.4, "darker": 0.5, "bands": rows}[light]
+    now = np.clip(moved(BEFORE.full[..., None].repeat(3, axis=2), lambda p: p - [4, 3]) * factor, 0, 255).astype(np.uint8)
+    error = np.linalg.norm(FLOW.follow(BEFORE, Grays.of(now), POINTS) - POINTS - [4, 3], axis=1)
+    assert np.mean(error < 0.3) > 0.9
 
 
 def test_points_of_a_picture_that_is_gone_do_not_come_back() -> None:

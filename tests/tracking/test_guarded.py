@@ -112,3 +112,25 @@ def test_nothing_is_said_of_surroundings_that_are_not_in_the_picture() -> None:
     corners = np.array([[0.0, 0.0], [SIZE[0], 0.0], [0.0, SIZE[1]], list(SIZE)])
     assert not same_background(IMAGE, IMAGE, corners)
     assert same_background(IMAGE, IMAGE, 0.5 * corners)
+
+
+def test_what_comes_into_sight_far_from_where_it_was_expected_is_found() -> None:
+    tracker, cover = followed(), POINTS[:, 0] > np.quantile(POINTS[:, 0], 0.4)
+    for k in np.linspace(0.3, 1.2, 12):
+        image, _ = scene(float(k))
+        image[:, int(np.quantile(POINTS[:, 0], 0.4)) :] = ELSEWHERE[:, int(np.quantile(POINTS[:, 0], 0.4)) :]
+        tracker.track(image)
+    image, truth = scene(1.2)
+    astray = np.where(cover[:, None], truth + 25.0, truth)
+    found = [tracker.track(image, astray) for _ in range(40)]
+    assert found[-1].observation.visible[cover].mean() > 0.5
+    assert right(found[-1], truth)
+
+
+@pytest.mark.parametrize("light", [0.6, 1.4])
+def test_a_change_of_light_is_another_picture_of_the_same_background(light: float) -> None:
+    page = cv2.resize(texture(3), (640, 480))
+    brighter = np.clip(page * light, 0, 255).astype(np.uint8)
+    surface = np.array([[250.0, 200.0], [390.0, 200.0], [390.0, 300.0], [250.0, 300.0]])
+    assert same_background(page, brighter, surface)
+    assert not same_background(page, cv2.resize(texture(4), (640, 480)), surface)

@@ -8,7 +8,7 @@ import numpy as np
 from tracking import Array, Flags, Image, TrackingError
 from tracking.features import detect_corners
 from tracking.flow import CONVERGED_PX, FEW_GUIDES, Grays, levels_of, lucas_kanade, returned
-from tracking.region.surface import FAR_ENOUGH, STILL_PX, Surface, middling, surfaces
+from tracking.region.surface import FAR_ENOUGH, Surface, middling, surfaces
 from tracking.video import Frame
 
 MOST_FRAMES = 90  # are looked at
@@ -84,6 +84,11 @@ class Search:
         """Whether further frames would not tell more."""
         return self.frames >= MOST_FRAMES or self.moved_px > FAR_ENOUGH * max(self._region.shape)
 
+    @property
+    def faint(self) -> bool:
+        """Whether the first frame was much fainter than the last."""
+        return self._contrast_now() > CLEARER * self._contrast
+
     def add(self, image_bgr: Image) -> bool:
         """Look at the next frame; False if most points are lost, or it is much clearer: nothing of it is kept."""
         before, self._grays, last = self._grays, Grays.of(image_bgr), self._tracks[-1]
@@ -135,7 +140,7 @@ def followed(before: Grays, now: Grays, points_px: Array) -> tuple[Array, Flags]
 def search(frames: Iterable[Frame], region: Image) -> Found:
     """Look for the surface in a region (H, W) uint8 of the first frames.
 
-    Past those without texture, those that fade in, and a picture that is cut away before anything in it has moved.
+    Past those without texture, those that fade in, and a picture that is cut away before it moved half of what is enough.
 
     Raises:
         TrackingError: no frame has enough corners.
@@ -146,10 +151,12 @@ def search(frames: Iterable[Frame], region: Image) -> Found:
     for waited, frame in enumerate(frames):
         if begun is not None:
             same = begun[0].add(frame.image)
-            if begun[0].enough or (not same and begun[0].moved_px > STILL_PX):
-                break
-            if same:
+            if same and not begun[0].faint:
+                if begun[0].enough:
+                    break
                 continue
+            if not same and begun[0].moved_px > 0.5 * FAR_ENOUGH * max(region.shape):
+                break
             earlier, begun = begun, None
         try:
             begun = Search(frame.image, region), frame

@@ -89,6 +89,41 @@ def test_black_frames_are_waited_for() -> None:
     assert overlap(found, 90, 60, 130, 110) > 0.75
 
 
+def test_a_fade_is_waited_for() -> None:
+    first, *later = scene((90, 60, 130, 110, 25.0))
+    faint = [Frame(k, k / 30, (first.image * (k / 20)).astype(np.uint8)) for k in range(20)]
+    found = search([*faint, *(Frame(frame.index + 20, frame.time_s, frame.image) for frame in later)], WHOLE)
+    assert 8 <= found.first.index <= 20
+    assert overlap(found, 90, 60, 130, 110) > 0.7
+
+
+def test_what_comes_after_a_title_card_is_taken() -> None:
+    card = [Frame(k, k / 30, texture(7)) for k in range(12)]
+    begun = (Frame(frame.index + 12, frame.time_s, frame.image) for frame in scene((90, 60, 130, 110, 25.0)))
+    found = search([*card, *begun], WHOLE)
+    assert found.first.index == 12
+    assert overlap(found, 90, 60, 130, 110) > 0.75
+
+
+def test_what_comes_before_a_cut_is_taken_if_it_moves() -> None:
+    after = [Frame(60 + k, 2 + k / 30, texture(7)) for k in range(12)]
+    found = search([*scene((90, 60, 130, 110, 12.0)), *after], WHOLE)
+    assert found.first.index == 0
+    assert overlap(found, 90, 60, 130, 110) > 0.7
+
+
+def test_of_a_drawn_region_what_is_in_its_middle_is_taken() -> None:
+    region = np.zeros_like(WHOLE)
+    region[40:200, 70:250] = 255
+    frames = list(scene((90, 60, 130, 110, 20.0), frames=60))
+    for frame in frames:  # the wall goes farther
+        wall = np.roll(texture(1), 2 * frame.index, axis=0)
+        still = (frame.image == texture(1)).all(axis=2)
+        frame.image[still] = wall[still]
+    found = search(frames, region)
+    assert overlap(found, 90, 60, 130, 110) > 0.6
+
+
 def test_only_black_frames_are_an_error() -> None:
     with pytest.raises(TrackingError, match="corners"):
         search([Frame(k, k / 30, np.zeros((240, 320, 3), np.uint8)) for k in range(5)], WHOLE)
