@@ -45,7 +45,7 @@ def modes(command: Modes, progress: Progress) -> Drawn:
     """
     check_outputs({"--out": command.out}, [command.source], overwrite=command.overwrite)
     with threadpool_limits(1), progress:
-        recorded = not zipfile.is_zipfile(command.source)  # an .npz is one
+        recorded = not (command.source.is_file() and zipfile.is_zipfile(command.source))  # an .npz is one
         name, basis, mesh, metric = (of_recording if recorded else of_tracks)(command, progress)
         eigenvalues = spectrum(basis, mesh, metric)
         png = modes_figure(basis, mesh, eigenvalues, title=title_of(name, basis, metric), columns=command.columns)

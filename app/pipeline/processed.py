@@ -11,6 +11,8 @@ from reconstruction.settings import Metric
 from tracking.klt import Observation
 from tracking.video import Frame
 
+MOST_BYTES = 400 * 2**20  # of pictures that wait for shapes
+
 
 @dataclass(frozen=True, eq=False)
 class Surface:
@@ -43,7 +45,7 @@ class Processed:
     Attributes:
         frame: the picture, its number and its time.
         observation: the points tracked in it.
-        estimate: its shape; None where the surface was lost, or never had a model.
+        estimate: its shape; None where the surface was lost, never had a model, or had to be waited for too long.
         surface: what the estimate is of: the same object until another surface is followed; None before there is a model.
     """
 
@@ -67,8 +69,11 @@ class InOrder:
 
     def add(self, frame: Frame, observation: Observation) -> None:
         """A frame that has no shape yet."""
-        if self.wanted:
-            self._waiting.append((frame, observation))
+        if not self.wanted:
+            return
+        self._waiting.append((frame, observation))
+        while len(self._waiting) * frame.image.nbytes > MOST_BYTES:  # lost in its start, it may be so for ever
+            self._ready.append(Processed(*self._waiting.popleft(), None, None))
 
     def shape(self, index: int, estimate: ShapeEstimate, surface: Surface | None) -> None:
         """The shape of the frame of that index; those before it will have none."""

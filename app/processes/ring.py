@@ -7,6 +7,7 @@ import time
 import numpy as np
 
 from app.arrays import Image
+from app.terminal.errors import UsageError
 
 HEADER = 4096  # bytes before the first picture, with the count of those released
 MOST_BYTES = 64 * 2**20
@@ -31,8 +32,11 @@ class Ring:
         width, height = size
         one = width * height * 3
         slots = int(np.clip(MOST_BYTES // one, FEWEST, MOST))
-        os.ftruncate(file, HEADER + slots * one)  # new bytes are 0; again, nothing
-        memory = mmap.mmap(file, HEADER + slots * one)
+        try:
+            os.ftruncate(file, HEADER + slots * one)  # new bytes are 0; again, nothing
+            memory = mmap.mmap(file, HEADER + slots * one)
+        except OSError as error:
+            raise UsageError(f"no room for the pictures of processes ({error.strerror}): --jobs 1 needs none") from error
         self._released = np.frombuffer(memory, np.int64, 1)
         self._pictures = np.frombuffer(memory, np.uint8, offset=HEADER).reshape(slots, height, width, 3)
         self._parent = os.getppid()

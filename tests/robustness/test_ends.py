@@ -1,6 +1,7 @@
 """However a run ends, what it has written is there: killed, interrupted, on a full disk."""
 
 import json
+import os
 import random
 import resource
 import signal
@@ -8,6 +9,7 @@ import subprocess
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.playback.playback import Playback
@@ -39,6 +41,7 @@ def start(video: Path, folder: Path, *options: str, limit: int | None = None) ->
         stderr=subprocess.PIPE,
         text=True,
         preexec_fn=prepare,
+        start_new_session=True,
     )
 
 
@@ -79,6 +82,32 @@ def test_a_run_is_written_while_it_goes(endless: Path, tmp_path: Path) -> None:
         time.sleep(0.02)
     process.kill()
     process.communicate()
+
+
+@pytest.mark.parametrize(
+    "signals", [[signal.SIGHUP], pytest.param([signal.SIGINT] * 4, marks=pytest.mark.slow)], ids=["hangup", "impatience"]
+)
+def test_what_was_asked_for_is_written(endless: Path, tmp_path: Path, signals: list[signal.Signals]) -> None:
+    process = start(endless, tmp_path, "--tracks-out", "tracks.npz", "--shapes-out", "shapes.npz")
+    begun(process, tmp_path / "run.rrd")
+    for number in signals:
+        process.send_signal(number)
+        time.sleep(0.05)
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 130, err
+    frames = json.loads(out)["frames"]
+    assert len(np.load(tmp_path / "tracks.npz")["W"]) == frames
+    assert len(np.load(tmp_path / "shapes.npz")["S"]) == frames
+    verify(tmp_path / "run.rrd")
+
+
+def test_killed_at_once_leaves_nothing_or_a_recording(endless: Path, tmp_path: Path) -> None:
+    process = start(endless, tmp_path)
+    time.sleep(1.0)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    left = list(tmp_path.iterdir())
+    assert not left or (left == [tmp_path / "run.rrd"] and len(Playback.load(left[0]).frames) > 0)
 
 
 def test_a_full_disk_is_told_and_earlier_recordings_stay(endless: Path, tmp_path: Path) -> None:

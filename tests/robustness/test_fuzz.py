@@ -1,16 +1,23 @@
 """Damaged inputs end in one line or in a result, never in a crash."""
 
 import json
+from pathlib import Path
 
 import pytest
 
-from tests.robustness.fuzz import KINDS, fuzz
+from tests.robustness.fuzz import ALL, fuzz, make_samples
 
-FEW, MORE = range(5), range(5, 25)
+FEW, MORE = range(4), range(4, 24)
+
+
+@pytest.fixture(scope="module")
+def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("samples")
+    make_samples(folder)
+    return folder
 
 
 @pytest.mark.parametrize("cases", [FEW, pytest.param(MORE, marks=pytest.mark.slow)], ids=["few", "more"])
-@pytest.mark.parametrize("kind", [*KINDS, "command"])
-def test_damaged_inputs(kind: str, cases: range) -> None:
-    wrong = fuzz(kind, cases)
+def test_damaged_inputs(samples: Path, cases: range) -> None:
+    wrong = fuzz(samples, ALL, cases)
     assert not wrong, json.dumps(wrong, indent=1)
