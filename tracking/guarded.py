@@ -7,7 +7,7 @@ from enum import Enum
 import cv2
 import numpy as np
 
-from tracking import Array, Image
+from tracking import Array, Flags, Image
 from tracking.klt import Observation, PointTracker
 from tracking.region.left_behind import LeftBehind
 from tracking.relocalisation import Relocalisation
@@ -52,12 +52,14 @@ class Guarded:
         change: whether it was lost or found in this frame.
         reason: why, in words.
         cut: whether it was lost with everything around it, from one frame to the next.
+        astray: (P,) points found never to have been on the surface; None where there are no new ones.
     """
 
     observation: Observation
     change: Change = Change.NONE
     reason: str = ""
     cut: bool = False
+    astray: Flags | None = None
 
 
 class GuardedTracker:
@@ -108,7 +110,8 @@ class GuardedTracker:
         if not behind:
             return Guarded(observation)
         self._tracker.give_up(self._left_behind.points)
-        return Guarded(observation, reason=f"{behind} points stay behind while the surface moves: they are given up")
+        how = f"{behind} points stay behind while the surface moves: they are given up"
+        return Guarded(observation, reason=how, astray=self._left_behind.points.copy())
 
     def _search(self, image_bgr: Image) -> Guarded:
         self.frames_lost += 1

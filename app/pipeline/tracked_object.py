@@ -80,6 +80,7 @@ class TrackedObject:
         height, width = first.image.shape[:2]
         self.reconstruction = estimator(config, (width, height), points_px, start, frames)
         self.lost = False
+        self._astray = np.zeros(len(points_px), np.bool_)
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
         stored = config.passes or config.output.tracks_out
         self._stored = StoredTracks(len(self.points_px)) if stored else None
@@ -132,6 +133,8 @@ class TrackedObject:
         """What the next frame shows of it."""
         if isinstance(seen, Begun):
             return Guarded(Observation(self.points_px, np.ones(len(self.points_px), np.bool_)))
+        if seen.astray is not None:
+            self._astray |= seen.astray
         if seen.change is not Change.NONE:
             self.lost = seen.change is Change.LOST
         if seen.change is Change.RECOVERED:  # nothing ties it to where it was
@@ -179,7 +182,7 @@ class TrackedObject:
                 lost = False
             self._times[stored.index] = stored.time_s
             seen = stored.observation
-            yield from self._of_frames(self.reconstruction.update(seen.points_px.T, seen.visible))
+            yield from self._of_frames(self.reconstruction.update(seen.points_px.T, seen.visible & ~self._astray))
 
     def score(self, collected: Collected | None) -> Scores | None:
         """Errors of estimates against the truth; None without one, or before there is a shape."""

@@ -53,11 +53,14 @@ def test_the_tracker_gives_them_up() -> None:
     first = picture(0)
     points = detect_corners(cv2.cvtColor(first, cv2.COLOR_BGR2GRAY), np.full((240, 320), 255, np.uint8), 300)
     on_mark = ((points > [34, 194]) & (points < [126, 226])).all(axis=1)
-    tracker, told = GuardedTracker(first, points), []
+    tracker, told, astray = GuardedTracker(first, points), [], np.zeros(len(points), np.bool_)
     for k in range(1, 50):
         guarded = tracker.track(picture(k))
+        astray |= False if guarded.astray is None else guarded.astray
         told += [guarded.reason] if guarded.reason else []
     assert on_mark.sum() > 8
     assert not guarded.observation.visible[on_mark].any()
+    assert astray[on_mark].mean() > 0.9
+    assert astray[~on_mark].mean() < 0.1
     assert any("stay behind" in text for text in told)
     assert not tracker.lost
