@@ -10,6 +10,7 @@ Metric = Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen
 MetricChoice = Literal["auto", Metric]
 Deformation = Literal["auto", "bending", "stretching", "general", "inextensible"]
 RecoveredRestShape = Literal["auto", "rigid", "plane"]
+FIRST_LOOKS = (10, 15, 20, 30, 45, 60)  # frames after which a first model is looked for; the last decides
 USUAL_MODES = 20
 MORE_MODES = 40  # of what deforms and is seen well
 PriorName = Literal["rest", "smoothness", "rotation", "scale", "inextensibility"]

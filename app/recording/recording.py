@@ -81,6 +81,7 @@ class Recording:
         self._undrawn: dict[int, Shape] = {}
         self._placed = False
         self._stages: set[str] = set()
+        self._wanted = configuration.get("bootstrap_frames")
 
         urls = [running_viewer(connect)] if connect else []
         if image == "video":
@@ -123,7 +124,7 @@ class Recording:
                 self._stream.points(entities.PREDICTED, NOWHERE)
                 self._stream.row(entities.WIREFRAME, rr.LineStrips2D.columns, strips=NO_STRIPS)
             if self._model is None:
-                self._stream.row(entities.STATUS, rr.Points3D.columns, **waiting_for(self._frames + 1))
+                self._stream.row(entities.STATUS, rr.Points3D.columns, **waiting_for(self._frames + 1, self._wanted))
             self._stream.row(entities.OBSERVATION, ours("Observation"), visible=visible, phase=[phase])
             if visible.size:
                 self._stream.scalars(entities.VISIBLE, visible.mean())

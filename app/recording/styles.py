@@ -12,6 +12,7 @@ from app.recording.stream import Loggable
 from app.recording.wireframe import Strips
 from reconstruction.basis.model import Model
 from reconstruction.camera import Camera
+from reconstruction.settings import FIRST_LOOKS
 
 SEEN_RGB = (64, 224, 128)
 PREDICTED_RGB = (255, 176, 0)
@@ -123,9 +124,10 @@ def model_components(
     }
 
 
-def waiting_for(frames: int) -> dict[str, Values]:
-    """What is said in place of a mesh while the first frames are watched: a row of Points3D."""
-    text = [f"watching the first frames: {frames}"]
+def waiting_for(frames: int, most: object) -> dict[str, Values]:
+    """What is said in place of a mesh while the first frames are watched, `most` of them or "auto": a row of Points3D."""
+    wanted = most if isinstance(most, int) else FIRST_LOOKS[-1]
+    text = [f"watching the first frames: {min(frames, wanted)}/{wanted}"]
     return points(np.zeros((1, 3)), (205, 210, 220), 0.0) | {"labels": text, "show_labels": np.array([True])}
 
 

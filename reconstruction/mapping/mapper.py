@@ -13,9 +13,8 @@ from reconstruction.mapping.bootstrap import bootstrap
 from reconstruction.mapping.keyframes import Keyframes, difference
 from reconstruction.mapping.map import Map, map_of
 from reconstruction.mapping.solid.bundle import Bundle
-from reconstruction.settings import Settings
+from reconstruction.settings import FIRST_LOOKS, Settings
 
-FIRST_LOOKS = (10, 15, 20, 30, 45, 60)  # frames after which a first model is looked for; the last decides
 LATENCY = 90  # frames after which a map that another process makes is in force: three seconds of most videos
 FEWEST = 10  # keyframes for a map
 FEWEST_POINTS = 4  # that a frame shows, for a first model

@@ -122,7 +122,7 @@ def test_points_are_lost_until_a_shape_predicts_them(run: Run, rows: Rows, tmp_p
 def test_until_there_is_a_shape_the_view_says_what_is_waited_for(rows: Rows, tmp_path: Path) -> None:
     assert rows[entities.STATUS, "Points3D:labels"][1] == []
     shapeless = read(write_run(tmp_path / "shapeless.rrd", frames=2, first_shape=9).path)
-    assert shapeless[entities.STATUS, "Points3D:labels"][1] == ["watching the first frames: 2"]
+    assert shapeless[entities.STATUS, "Points3D:labels"][1] == ["watching the first frames: 2/60"]
 
 
 def test_a_lost_surface_leaves_no_mesh_on_the_picture(tmp_path: Path) -> None:

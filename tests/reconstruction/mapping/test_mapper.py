@@ -11,8 +11,8 @@ from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaterni
 from reconstruction.mapping import mapper
 from reconstruction.mapping.keyframes import KEYFRAMES
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.mapper import FEWEST, FIRST_LOOKS, LATENCY, RENEWED, Mapper, at_once, nearest_first
-from reconstruction.settings import Settings
+from reconstruction.mapping.mapper import FEWEST, LATENCY, RENEWED, Mapper, at_once, nearest_first
+from reconstruction.settings import FIRST_LOOKS, Settings
 
 POINTS = 20
 CAMERA = Camera(500.0, np.zeros(2))
