@@ -25,7 +25,7 @@ def test_errors_are_as_large_as_predicted(scene, noise_px: float, camera: Camera
     _, estimates = reconstruct(noisy(W, noise_px), camera, UNSURE, truth)
     sigma = np.stack([e.sigma for e in estimates if e.sigma is not None])
     settled = slice(18, None)  # both deform
-    assert 0.4 < error_over_sigma(shapes_of(estimates)[settled], sigma[settled], truth[settled]) < 2.5
+    assert 0.4 < error_over_sigma(shapes_of(estimates)[settled], sigma[settled], truth[settled]) < 2.8
 
 
 def test_what_is_hidden_is_less_sure() -> None:
