@@ -29,7 +29,13 @@ def load_mesh(path: Path) -> tuple[Array, Mesh]:
         vertices, faces = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64)
     except Exception as error:  # trimesh's readers raise whatever comes
         raise UsageError(f"cannot read the mesh {path}: {error or type(error).__name__}") from None
-    if vertices.ndim != 2 or len(vertices) < 4 or len(faces) < 1 or not np.isfinite(vertices).all():
+    if (
+        vertices.shape[1:] != (3,)
+        or faces.shape[1:] != (3,)
+        or len(vertices) < 4
+        or len(faces) < 1
+        or not np.isfinite(vertices).all()
+    ):
         raise UsageError(f"the mesh {path} does not fit: it needs at least 4 finite vertices and a triangle")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise UsageError(f"the mesh {path} is damaged: its triangles name vertices that it does not have")

@@ -110,6 +110,8 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
         if config.final_pass and reconstruction.revise():
             estimates = reconstructed(reconstruction, W, visible, progress)
         elapsed_ms = (perf_counter() - started) * 1e3
+    if not all(np.isfinite(estimate.shape).all() for estimate in (*online, *estimates)):
+        raise UsageError(f"the points of {config.tracks} fit no shape: try another --rest-shape or --camera")
     for k, estimate in enumerate(estimates):
         collected.add(k, estimate)
     rest = reconstruction.rest
@@ -153,8 +155,11 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
 def reconstructed(reconstruction: Reconstruction, W: Array, visible: Flags, progress: Progress) -> list[ShapeEstimate]:
     """The shapes known with each frame of tracks W (F, 2, P) px, visible (F, P)."""
     estimates = []
-    for w, h in zip(W, visible, strict=True):
-        estimates += reconstruction.update(np.where(h, w, np.nan), h)
+    for frame, (w, h) in enumerate(zip(W, visible, strict=True)):
+        try:
+            estimates += reconstruction.update(np.where(h, w, np.nan), h)
+        except np.linalg.LinAlgError as error:  # the numbers have grown beyond all bounds
+            raise UsageError(f"the points of frame {frame} fit no shape: try another --rest-shape") from error
         progress.advance(reconstruction.phase.value)
     return estimates
 
