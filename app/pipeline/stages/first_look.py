@@ -13,6 +13,7 @@ from tracking.region.surface import Surface
 from tracking.video import Frame, Video
 
 MOST_BYTES = 200 * 2**20  # of the first pictures of a live source that are kept while the surface is looked for
+LEADING = 10  # of those, when late ones are left out, lead from the first to the newest
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,9 @@ def first_look(config: Source, video: Video) -> FirstLook:
     if video.live:
         kept: list[Frame] = []
         found = copy.found(search(copies(keeping(frames, kept), copy), copy.picture(region)))
+        if config.drop_late:
+            kept = [frame for frame in kept if frame.index >= found.first.index]
+            kept = kept[:: len(kept) // LEADING + 1]
         frames = chain(kept, frames)
     else:
         with Video(config.source, *config.frame_range, duration_s=config.duration) as ahead:
