@@ -28,6 +28,7 @@ FAIR_SHARE, POOR_SHARE = 0.5, 0.3
 # Lengths of a sheet that keeps them change by what noise makes of them, about as much as the median error; by one and a
 # half times that and more where they really change (a balloon, a crease), and then no rest shape is right.
 FAIR_STRAIN = 1.5
+LITTLE_STRAIN = 0.005  # of lengths: lenses and tracks leave as much over with good shapes
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
@@ -172,6 +173,6 @@ def evidence(course: Course, found: Map, *, known: bool) -> Iterator[Verdict]:
             )
         return
     usual = float(np.nanmedian(np.asarray(course.errors)))
-    if found.sheet is not None and found.sheet.strain_rms > FAIR_STRAIN * usual:
+    if found.sheet is not None and found.sheet.strain_rms > max(FAIR_STRAIN * usual, LITTLE_STRAIN):
         told = f"its lengths change by {found.sheet.strain_rms:.1%}, more than noise explains: it stretches, or has creases"
         yield Verdict("fair", told)
