@@ -120,6 +120,16 @@ def bits_per_px(capture: Capture) -> float | None:
     return bits / pixels if bits > 0 and pixels > 0 else None
 
 
+def few_bits(source: str) -> float | None:
+    """Bits that a file spends on a pixel, if they are so few that hardly any texture is left; else None."""
+    if not Path(source).is_file():
+        return None
+    capture = cv2.VideoCapture(source)
+    bits = bits_per_px(cast(Capture, capture)) if capture.isOpened() else None
+    capture.release()
+    return bits if bits is not None and bits < FEW_BITS else None
+
+
 def squared(capture: Capture, source: str, log: Log) -> Capture:
     """A capture of square pixels; `log` is told where the video's are not."""
     aspect = pixel_aspect(capture)
@@ -160,8 +170,7 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
     file = cv2.VideoCapture(source)
     if not file.isOpened():
         raise TrackingError(f"{source} cannot be decoded; it is not a video, or it is damaged or cut off")
-    bits = bits_per_px(cast(Capture, file))
-    if bits is not None and bits < FEW_BITS:
+    if (bits := few_bits(source)) is not None:
         log(f"{source} is compressed to {bits:.2g} bits a pixel: little texture is left to follow; export it with more")
     return squared(cast(Capture, file), source, log)
 

@@ -12,6 +12,7 @@ from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
 from app.terminal.exit_code import ExitCode
 from app.terminal.summary import Summary, print_lines
+from tracking.capture import few_bits
 from tracking.guarded import Change, Guarded
 
 KINDS = {"isometric": "sheet", "rigid": "solid", "plane": "flat sheet", "mesh": "mesh given", "truth": "shape given"}
@@ -165,7 +166,7 @@ def summary_of(
 ) -> RunSummary:
     """The summary of a run and of one of its objects."""
     reconstruction, collected = tracked.reconstruction, tracked.collected
-    word = verdict(collected.course, reconstruction.map)
+    word = verdict(collected.course, reconstruction.map, few_bits(tracked.config.source))
     rest, camera = reconstruction.rest, reconstruction.camera
     online = tracked.score(tracked.online)
     several = len(recordings) > 1

@@ -76,16 +76,20 @@ class Verdict:
         return f"{self.grade}: {self.reason}"
 
 
-def verdict(course: Course, found: Map | None) -> Verdict:
+def verdict(course: Course, found: Map | None, bits_per_px: float | None = None) -> Verdict:
     """The verdict on shapes of frames.
 
     Args:
         course: what each frame tells.
         found: what the object is taken for; None if there is no model.
+        bits_per_px: what the video's encoder spent, if that is so little that what is seen may not be what was there.
     """
     if found is None or np.isnan(np.asarray(course.errors)).all():
         return Verdict("poor", "there is no shape; the video is too short, or the surface has too little texture")
     findings = [*errors(course, found), *seen(course)]
+    if bits_per_px is not None:
+        told = f"compressed to {bits_per_px:.2g} bits a pixel, texture is made up between key pictures; export it with more"
+        findings.append(Verdict("poor", told))
     findings += evidence(course, found, known=bool(findings))
     worst: Grade = next((grade for grade in GRADES if any(one.grade == grade for one in findings)), "good")
     reasons = [one.reason for one in findings if one.grade == worst]

@@ -64,3 +64,9 @@ def test_without_a_shape() -> None:
 def test_the_longest_stretch() -> None:
     assert longest(np.array([True, False, True, True, False])) == (2, 2)
     assert longest(np.zeros(3, bool)) == (0, 0)
+
+
+def test_hardly_any_bits() -> None:
+    said = verdict(course([0.003] * 50), SOLID, 0.005)
+    assert said.grade == "poor"
+    assert "0.005 bits a pixel" in said.reason
