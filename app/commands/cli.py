@@ -1,5 +1,6 @@
 """The command line: parsed first, so that `--help` is instant; what it needs is imported afterwards."""
 
+import atexit
 import contextlib
 import io
 import os
@@ -63,6 +64,7 @@ def main() -> NoReturn:
             warnings.simplefilter("ignore")  # of numbers: the verdict says what they are worth
             sys.exit(carry_out(parse(sys.argv[1:])))
     except KeyboardInterrupt:
+        atexit.register(finish)
         sys.exit(ExitCode.INTERRUPTED)
     except Exception as error:
         if isinstance(error, OSError) and error.filename is not None:
@@ -164,6 +166,12 @@ def carry_out(options: Any) -> ExitCode:
 def interrupt(_signum: int, _frame: object) -> NoReturn:
     """A signal ends a run as Ctrl-C does: with everything so far kept."""
     raise KeyboardInterrupt
+
+
+def finish() -> None:
+    """Further signals say nothing new: all is written, and the exit code is to say that it was interrupted."""
+    for number in (signal.SIGINT, *ENDING):
+        signal.signal(number, signal.SIG_IGN)
 
 
 def is_ours(error: Exception) -> bool:
