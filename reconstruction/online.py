@@ -22,7 +22,7 @@ from reconstruction.window.energy import build_energy, build_guide
 from reconstruction.window.priors import Weights
 from reconstruction.window.window import SlidingWindow
 
-CATCH_UP = 4  # most frames of a live source whose shapes are found with one observation, while others wait
+CATCH_UP = 4  # most frames whose shapes are found with one observation, where models are made meanwhile
 
 
 class Phase(Enum):
@@ -122,6 +122,11 @@ class Reconstruction:
         paper = self.settings.energy == "paper"
         return priors.weights(self.settings.priors, self.deformation, perspective=self.camera.perspective, paper=paper)
 
+    @property
+    def behind(self) -> bool:
+        """Whether frames wait for shapes."""
+        return bool(self._waiting)
+
     def predict(self, ahead: int = 1) -> Array | None:
         """Where so many frames on the points will be, (p, 2) px at constant velocity; None while frames wait for shapes."""
         return None if self.window is None or self._waiting else self.window.predict(ahead)
@@ -144,7 +149,7 @@ class Reconstruction:
         if found is not None:
             self.revisions += self.window is not None
             self._adopt(found)
-        return self._advance(CATCH_UP if self._mapper and self._mapper.live else len(self._waiting))
+        return self._advance(CATCH_UP if self._mapper and self._mapper.latency else len(self._waiting))
 
     def restart(self) -> None:
         """The surface was lost and is seen again, somewhere else: keep the model, forget the last frames."""

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from app.recording.recording import Recording
 from reconstruction.basis.mesh import Mesh, triangulate
-from reconstruction.basis.modes import ModalBasis, modal_basis
+from reconstruction.basis.modal_basis import ModalBasis
+from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
 from reconstruction.estimate import ShapeEstimate
 from tracking.klt import Observation

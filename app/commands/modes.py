@@ -16,7 +16,7 @@ from app.terminal.progress import Progress
 from app.terminal.summary import Summary
 from reconstruction.basis.distances import fitting
 from reconstruction.basis.mesh import Mesh
-from reconstruction.basis.modes import ModalBasis
+from reconstruction.basis.modal_basis import ModalBasis
 from reconstruction.basis.rest_shape import is_flat
 from reconstruction.settings import Metric, MetricChoice
 

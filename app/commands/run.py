@@ -16,7 +16,7 @@ def run(command: Run, progress: Progress) -> "RunSummary":
     Raises:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and what helps.
     """
-    with Launched(command.jobs) as launched:
+    with Launched(command) as launched:
         from app.pipeline.session import Session  # it loads while the processes of the stages do
 
         return Session(command, progress, launched=launched).run()

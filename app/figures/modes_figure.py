@@ -14,7 +14,8 @@ from app.arrays import Array, Indices
 from app.recording.modes import MOVEMENT_RGB, View, brightness, displaced, normalised
 from reconstruction.basis.distances import dissimilarity
 from reconstruction.basis.mesh import Mesh
-from reconstruction.basis.modes import ModalBasis, doubly_centred, exact_points
+from reconstruction.basis.modal_basis import ModalBasis
+from reconstruction.basis.modes import doubly_centred, exact_points
 from reconstruction.settings import Metric
 
 COLUMNS = 5

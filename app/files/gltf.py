@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from app.arrays import Array, Indices
 from app.files.gltf_buffer import Buffer
-from reconstruction.basis.modes import ROW_NAMES, ModalBasis
+from reconstruction.basis.modal_basis import ROW_NAMES, ModalBasis
 from reconstruction.camera import rotation_from_quaternion
 
 JPEG_QUALITY = 95

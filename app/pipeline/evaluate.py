@@ -15,7 +15,7 @@ from app.options.evaluate import Evaluate
 from app.pipeline.estimates import Collected, Scores, save_shapes, sigmas
 from app.pipeline.prepare import settings_of
 from app.pipeline.quality.verdict import Grade, verdict
-from app.pipeline.stages.tracking import RECOVERED
+from app.pipeline.stages.messages import RECOVERED
 from app.pipeline.summary import KINDS
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress

@@ -10,7 +10,7 @@ from app.arrays import Array
 from app.files.writing import check_outputs
 from app.options.model import Model
 from app.options.run import Run
-from app.pipeline.stages.tracking import RECOVERED
+from app.pipeline.stages.messages import RECOVERED
 from reconstruction.camera import Camera
 from reconstruction.mapping.mapper import LATENCY, Mapper, Start
 from reconstruction.online import Reconstruction

@@ -16,8 +16,8 @@ from app.pipeline.parts import Parts
 from app.pipeline.prepare import check_files
 from app.pipeline.processed import InOrder, Processed, Surface
 from app.pipeline.stages.launched import Launched
+from app.pipeline.stages.messages import Asked, Seen
 from app.pipeline.stages.stages import Stages
-from app.pipeline.stages.tracking import LAG, Asked, Seen
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import Successor, options_for_another
 from app.pipeline.summary import Counts, RunSummary, summary_of
@@ -77,11 +77,9 @@ class Session:
         output = self._config.output
         needed = bool(self._record_unnamed or output.out or output.watched)
         self._wanted_again = needed or bool(output.shapes_out or self._config.ground_truth)
-        launched = self._launched or Launched(self._config.jobs, record=needed)
+        launched = self._launched or Launched(self._config, record=needed)
         with threadpool_limits(1), launched, Stages(self._config, launched) as stages:
             self._tracking, self._begin_map, self.fps = stages.tracking, stages.begin_map, stages.tracking.opened.fps
-            for _ in range(LAG):
-                self._tracking.send(Asked({0: None}))
             first, second = self._tracking.receive(), self._tracking.receive()
             if first is None or second is None:
                 raise UsageError(f"{self._config.source} gives only one frame: give a video, or more --frames")
@@ -234,8 +232,8 @@ class Session:
         self._begin_surface(frame.index, frame.time_s)
 
     def _split_recording(self, frame: Seen) -> None:
-        """Go on in another file, if it is time."""
-        if self._surface and self._parts.due(frame.time_s):
+        """Go on in another file, if it is time, and no frame of this one waits for its shape."""
+        if self._surface and not self._object.reconstruction.behind and self._parts.due(frame.time_s):
             self._recording.tell("summary", self._summary(self._object).as_dict())
             self._parts.open(frame.time_s, self._object.recording_options)
             self._recording.tell("rest", *self._surface.recorded)

@@ -9,7 +9,7 @@ import numpy as np
 from app.arrays import Array, Image
 from app.files.names import beside
 from app.options.run import Run
-from app.pipeline.stages.tracking import RECOVERED, Begun, Seen
+from app.pipeline.stages.messages import RECOVERED, Begun, Seen
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
 from reconstruction import ReconstructionError

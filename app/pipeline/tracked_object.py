@@ -15,7 +15,7 @@ from app.pipeline.estimates import Collected, Scores, save_shapes
 from app.pipeline.prepare import estimator
 from app.pipeline.processed import Surface
 from app.pipeline.quality.ruler import ruler
-from app.pipeline.stages.tracking import LAG, Begun
+from app.pipeline.stages.messages import LAG, Begun
 from app.pipeline.stopwatch import Stopwatch
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.mapper import Start

@@ -8,7 +8,7 @@ import numpy as np
 
 from app.arrays import Array, Indices
 from app.playback.playback import Playback
-from reconstruction.basis.modes import ROW_NAMES
+from reconstruction.basis.modal_basis import ROW_NAMES
 
 PARAMETERS = ("qw", "qx", "qy", "qz", "tx_px", "ty_px", "s")
 

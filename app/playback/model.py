@@ -11,8 +11,8 @@ from app.playback.reading.checks import check_model
 from app.playback.reading.rows import Rows
 from app.recording import entities
 from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.modal_basis import ModalBasis
 from reconstruction.basis.model import Model
-from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera
 
 MODEL = "modeshape.Model:"

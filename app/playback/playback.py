@@ -20,8 +20,8 @@ from app.playback.reading.file import RecordingFile
 from app.recording import entities
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.modal_basis import ModalBasis
 from reconstruction.basis.model import Model
-from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.arrays import Array, Indices
 from app.playback.playback import Playback
-from reconstruction.basis.modes import ROW_NAMES
+from reconstruction.basis.modal_basis import ROW_NAMES
 from reconstruction.basis.surface import Surface
 from reconstruction.camera import rotation_from_quaternion
 from reconstruction.estimate import ShapeEstimate

@@ -10,7 +10,6 @@ import numpy as np
 import rerun as rr
 
 from app.arrays import Array, Image, Indices
-from app.files.video_out import VideoSink, writable_video
 from app.recording.columns import Values
 from app.terminal.errors import UsageError
 from tracking.capture import Capture, pixel_aspect
@@ -54,6 +53,8 @@ def as_it_is(video: Path) -> bool:
 
 def upright(video: Path) -> rr.AssetVideo:
     """A copy of a video with its pictures as they are to be shown."""
+    from app.files.video_out import VideoSink, writable_video  # PyAV takes its time to load
+
     with TemporaryDirectory() as folder, ExitStack() as files:
         copy = Path(folder) / "upright.mp4"
         frames = files.enter_context(Video(str(video)))

@@ -10,7 +10,7 @@ from app.arrays import Array, Image, Indices
 from app.recording import entities
 from app.recording.stream import Loggable
 from reconstruction.basis.mesh import Mesh
-from reconstruction.basis.modes import ModalBasis
+from reconstruction.basis.modal_basis import ModalBasis
 
 AMPLITUDE = 0.18  # largest displacement, as a share of the rest shape's length
 TURN_DEGREES, TILT_DEGREES = 32.0, 28.0  # of the view against the first frame's camera: neither frontal nor from the side

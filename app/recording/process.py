@@ -216,6 +216,8 @@ def main() -> None:
     """What the other process does: exceptions are sent back, and None once everything is written."""
     import cv2
 
+    import app.recording.recording  # noqa: F401 (Rerun takes its time to load: while the surface is looked for)
+
     cv2.setNumThreads(1)
     connection = connection_to_parent()
     recordings = Recordings()

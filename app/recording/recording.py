@@ -25,8 +25,8 @@ from app.recording.viewer import running_viewer
 from app.recording.wireframe import NO_STRIPS, Strips
 from app.terminal.errors import UsageError
 from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.modal_basis import ModalBasis
 from reconstruction.basis.model import Model
-from reconstruction.basis.modes import ModalBasis
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
 from tracking.klt import Observation

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import Delaunay, QhullError
 
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices
@@ -44,6 +43,8 @@ def triangulate(points: Array) -> Mesh:
     """
     if len(points) < 3:
         raise ReconstructionError(f"cannot make a mesh of {len(points)} points: at least 3 are needed")
+    from scipy.spatial import Delaunay, QhullError  # takes its time to load, and who only draws needs none
+
     try:
         triangulation = Delaunay(points)
     except QhullError as error:

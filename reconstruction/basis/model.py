@@ -11,7 +11,7 @@ import numpy as np
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.constraints import CoarseEdges
 from reconstruction.basis.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges
-from reconstruction.basis.modes import ModalBasis, modal_basis, principal_axes
+from reconstruction.basis.modal_basis import ModalBasis, principal_axes
 from reconstruction.basis.rest_shape import RestShape, rms_radius
 from reconstruction.camera import Camera, nearest_rotation, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.estimate import ShapeEstimate
@@ -134,6 +134,8 @@ def build_model(
     Raises:
         ReconstructionError: more modes than the points carry.
     """
+    from reconstruction.basis.modes import modal_basis  # SciPy takes its time to load, and who only draws needs none
+
     shape = rest.motion.shape
     if mesh is None:
         mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)

@@ -16,6 +16,7 @@ from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.settings import FIRST_LOOKS, Settings
 
 LATENCY = 90  # frames after which a map that another process makes is in force: three seconds of most videos
+FIRST_LATENCY = 0.25  # the same of a first model, of the frames it is made of: it takes a fraction of the time
 FEWEST = 10  # keyframes for a map
 FEWEST_POINTS = 4  # that a frame shows, for a first model
 GROWN = 1.3  # times as far apart as at the last map the keyframes are before there is another,
@@ -50,24 +51,26 @@ class Mapper:
         settings: how to reconstruct.
         start: where models are made.
         frames: so many there will be, if that is known: what would be in force later is not begun.
-        live: whether frames do not wait for models: each is in force as soon as it is there. Else the first is when it is
-            begun, and others a fixed number of frames later, so that shapes depend on no machine's speed.
+        latency: so many frames after it was begun a map is in force, so that shapes depend on no machine's speed; a first
+            model sooner. With 0 nothing goes on meanwhile.
+        live: whether frames do not wait for models: each is in force as soon as it is there.
 
     Attributes:
-        live: the same.
+        latency: the same.
         first_frames: so many gave the first model.
     """
 
     def __init__(
         self, settings: Settings, start: Start = at_once, *, latency: int = 0, frames: int | None = None, live: bool = False
     ) -> None:
-        self._settings, self._start, self._latency, self.live = settings, start, latency, live
+        self._settings, self._start, self.latency, self._live = settings, start, latency, live
         self._frames = np.inf if frames is None else frames
         self._keyframes = Keyframes() if settings.maps else None
         self._frame = -1
         self._first: list[tuple[Array, Mask]] | None = []  # frames, until they have given the first model
         self.first_frames = 0
         self._looks = FIRST_LOOKS if settings.bootstrap_frames == "auto" else (settings.bootstrap_frames,)
+        self._looked = 0  # at so many first frames
         self._first_job: Job | None = None
         self._map_job: Job | None = None
         self._found: Map | None = None  # the last map
@@ -127,10 +130,11 @@ class Mapper:
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
         """Begin a first model, if it is time."""
         n = len(first)
-        if self._first_job is None and (n in self._looks or n > self._looks[-1]):
+        if self._first_job is None and (n in self._looks or self._looked < self._looks[-1] < n):
             arguments = *stacked(first), camera, self._settings, n >= self._looks[-1]
-            self._first_job = Job(self._start(bootstrap, *arguments), self._frame)
-            self.first_frames = n
+            due = self._frame + int(FIRST_LATENCY * n if self.latency else 0)
+            self._first_job = Job(self._start(bootstrap, *arguments), due)
+            self.first_frames = self._looked = n
 
     def _first_model(self) -> Map | None:
         """The first model, once it is in force."""
@@ -145,14 +149,14 @@ class Mapper:
     def _look_again(self, camera: Camera) -> None:
         """Begin a map, if the keyframes have more to tell than when they were last looked at."""
         keyframes = self._keyframes
-        if self._frame + self._latency >= self._frames:
+        if self._frame + self.latency >= self._frames:
             return
         if keyframes is None or self._map_job or self._frame + 1 < self._looks[-1] or len(keyframes.frames) < FEWEST:
             return
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
             self._version, self._extent = keyframes.version, keyframes.extent
             arguments = *keyframes.spread()[:2], camera, self._settings.estimate_focal, self._known
-            self._map_job = Job(self._start(map_of, *arguments), self._frame + self._latency)
+            self._map_job = Job(self._start(map_of, *arguments), self._frame + self.latency)
 
     def _another(self, begin: tuple[Array, Mask]) -> Map | None:
         """The map, once it is in force, posed first as in the frame where it begins."""
@@ -167,7 +171,7 @@ class Mapper:
 
     def _ready(self, job: Job | None) -> bool:
         """Whether a job's result is in force."""
-        return job is not None and (job.future.done() if self.live else self._frame >= job.due)
+        return job is not None and (job.future.done() if self._live else self._frame >= job.due)
 
 
 def stacked(frames: list[tuple[Array, Mask]]) -> tuple[Array, Mask]:

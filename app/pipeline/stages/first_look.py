@@ -1,5 +1,6 @@
 """What a run begins with: the surface in the first frames, unless the region is to be taken as it is given."""
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
@@ -12,7 +13,7 @@ from tracking.region.search import Found, search
 from tracking.region.surface import Surface
 from tracking.video import Frame, Video
 
-MOST_BYTES = 200 * 2**20  # of the first pictures of a live source that are kept while the surface is looked for
+MOST_BYTES = 200 * 2**20  # of the first pictures that are kept while the surface is looked for
 LEADING = 10  # of those, when late ones are left out, lead from the first to the newest
 
 
@@ -32,7 +33,7 @@ class FirstLook:
 
 
 def first_look(config: Source, video: Video) -> FirstLook:
-    """Look for the surface in the first frames of a video; a file's are read twice, those of a live source kept meanwhile.
+    """Look for the surface in the first frames of a video, which are kept meanwhile, or read again if too large.
 
     Raises:
         TrackingError: no frame with texture, or a region or mask that does not fit the picture.
@@ -41,27 +42,39 @@ def first_look(config: Source, video: Video) -> FirstLook:
     copy = WorkingCopy(video.size, full=config.full_size)
     if not config.search or config.outline is not None:  # drawn by hand
         return FirstLook(frames, region, [])
-    if video.live:
-        kept: list[Frame] = []
-        found = copy.found(search(copies(keeping(frames, kept), copy), copy.picture(region)))
-        if config.drop_late:
-            kept = [frame for frame in kept if frame.index >= found.first.index]
-            kept = kept[:: len(kept) // LEADING + 1]
-        frames = chain(kept, frames)
-    else:
-        with Video(config.source, *config.frame_range, duration_s=config.duration) as ahead:
-            found = copy.found(search(copies(ahead, copy), copy.picture(region)))
+    kept = deque[Frame]()
+    found = copy.found(search(copies(keeping(frames, kept, ends=video.live), copy), copy.picture(region)))
+    if config.drop_late:
+        kept = deque(frame for frame in kept if frame.index >= found.first.index)
+        kept = deque(list(kept)[:: len(kept) // LEADING + 1])
+    frames = chain(emptied(kept), frames) if kept else again(config)
     begun = next(frame for frame in frames if frame.index >= found.first.index)
     return FirstLook(chain([begun], frames), found.region, notes_on(found, video.first_index))
 
 
-def keeping(frames: Iterator[Frame], kept: list[Frame]) -> Iterator[Frame]:
-    """The frames, kept as they come, until they fill the memory there is for them."""
-    for frame in frames:
-        kept.append(frame)
+def keeping(frames: Iterator[Frame], kept: deque[Frame], *, ends: bool) -> Iterator[Frame]:
+    """The frames, kept as they come; when they fill the memory there is for them, they end, or none are kept."""
+    for count, frame in enumerate(frames, 1):
+        fits = count * frame.image.nbytes <= MOST_BYTES
+        if fits or ends:
+            kept.append(frame)
+        else:
+            kept.clear()
         yield frame
-        if len(kept) * frame.image.nbytes > MOST_BYTES:
+        if ends and not fits:
             return
+
+
+def emptied(kept: deque[Frame]) -> Iterator[Frame]:
+    """The frames; what has been taken is kept no more."""
+    while kept:
+        yield kept.popleft()
+
+
+def again(config: Source) -> Iterator[Frame]:
+    """All frames of a file."""
+    with Video(config.source, *config.frame_range, duration_s=config.duration) as video:
+        yield from video
 
 
 def copies(frames: Iterable[Frame], copy: WorkingCopy) -> Iterator[Frame]:

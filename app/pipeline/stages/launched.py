@@ -1,18 +1,20 @@
-"""The processes of the stages, begun: what they load takes as long as what the run loads, which may do so meanwhile."""
+"""The processes of the stages, begun: they load, and look for the surface, while the run itself still loads."""
 
 import os
 from types import TracebackType
 from typing import Self
 
+from app.options.run import Run
+from app.pipeline.stages.messages import first_asked
 from app.processes.child import child, shared_file
 from app.processes.remote import Remote
 
 
 class Launched:
-    """Processes that wait for what they are to do; a context manager that ends them.
+    """Processes at work, or waiting for it; a context manager that ends them.
 
     Args:
-        jobs: as for `run`: with 1, or on a machine with one core, there are none.
+        config: of the run; with one job, or on a machine with one core, there are none.
         record: whether there will be a recording.
 
     Attributes:
@@ -22,7 +24,8 @@ class Launched:
         recording: another, with the connection to it; None without a recording.
     """
 
-    def __init__(self, jobs: int | None, *, record: bool = True) -> None:
+    def __init__(self, config: Run, *, record: bool = True) -> None:
+        jobs = config.jobs
         if jobs is None:
             jobs = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
         self.apart = jobs > 1
@@ -30,6 +33,8 @@ class Launched:
             return
         self.pictures = shared_file()
         self.tracking = Remote("app.pipeline.stages.tracking_process", "follows the points", self.pictures)
+        for message in (config, *first_asked()):
+            self.tracking.send(message)
         self.recording = child("app.recording.process", self.pictures) if record else None
         self.maps = Remote("app.pipeline.stages.maps", "makes the models")
 

@@ -48,7 +48,7 @@ class Stages:
         with self._ends:  # what has begun ends if another cannot begin
             if self._launched.apart:
                 self.begin_map = self._ends.enter_context(MapProcess(self._launched.maps)).begin
-                tracking = TrackingProcess(self._config, self._launched.tracking, self._launched.pictures)
+                tracking = TrackingProcess(self._launched.tracking, self._launched.pictures)
                 self.tracking = self._ends.enter_context(tracking)
             else:
                 self.tracking = self._ends.enter_context(TrackingHere(self._config))

@@ -1,10 +1,9 @@
 """The stage that reads the source and follows points in it."""
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import perf_counter
-from typing import cast, get_args
+from typing import cast
 
 import cv2
 import numpy as np
@@ -13,93 +12,14 @@ from numpy.typing import NDArray
 from app.arrays import Array, Image
 from app.options.run import Run
 from app.pipeline.stages.first_look import first_look
+from app.pipeline.stages.messages import RECOVERED, Asked, Begun, Opened, Seen
 from app.pipeline.stages.working_copy import WorkingCopy
 from reconstruction.camera import Camera
-from reconstruction.settings import RecoveredRestShape
 from tracking import TrackingError
 from tracking.features import detect_corners
 from tracking.guarded import Change, Guarded, GuardedTracker
 from tracking.region.mask import outline, region_mask
 from tracking.video import Frame, Video
-
-LAG = 2  # frames between a frame and the first one whose tracking may know its shape: so many are on the way
-RECOVERED = get_args(RecoveredRestShape)  # rest shapes that come from the first frames
-
-
-@dataclass(frozen=True)
-class Opened:
-    """What is known of the source before its first frame.
-
-    Attributes:
-        size: (width, height) px.
-        fps: announced rate.
-        frame_count: announced number of frames, if any.
-    """
-
-    size: tuple[int, int]
-    fps: float
-    frame_count: int | None
-
-
-@dataclass(frozen=True)
-class Asked:
-    """What to follow in the next frame.
-
-    Attributes:
-        expected_px: for each object, by its number, where its points are expected (P, 2); None where nobody knows. One that
-            was not asked for before begins in that frame.
-    """
-
-    expected_px: Mapping[int, Array | None]
-
-
-@dataclass(frozen=True)
-class Begun:
-    """An object begins.
-
-    Attributes:
-        points_px: (P, 2) its points.
-        outline: the borders of the region they are from, (n, 2) px each.
-    """
-
-    points_px: Array
-    outline: list[Array] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Seen:
-    """What a frame shows.
-
-    Attributes:
-        number: of the frame, counted from 0.
-        index: its number in the source.
-        time_s: its time there.
-        read_s: when it was read, of a live source when it came, as `time.monotonic` tells it.
-        objects: the points of each object asked for; an error where none can begin.
-        told: what the source has to tell, in words.
-        stage_ms: milliseconds it took.
-    """
-
-    number: int
-    index: int
-    time_s: float
-    read_s: float
-    objects: Mapping[int, Begun | Guarded | TrackingError]
-    told: tuple[str, ...]
-    stage_ms: Mapping[str, float]
-
-    def points(self, number: int) -> "Begun | Guarded":
-        """Those of an object. Raises the error if it cannot begin."""
-        found = self.objects[number]
-        if isinstance(found, TrackingError):
-            raise found
-        return found
-
-    def begun(self, number: int) -> Begun:
-        """Those of an object that begins. Raises the error if it cannot."""
-        found = self.points(number)
-        assert isinstance(found, Begun)
-        return found
 
 
 class TrackingStage:

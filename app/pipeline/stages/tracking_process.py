@@ -8,14 +8,15 @@ import cv2
 
 from app.arrays import Image
 from app.options.run import Run
-from app.pipeline.stages.tracking import LAG, Asked, Opened, Seen, TrackingStage
+from app.pipeline.stages.messages import LAG, Asked, Opened, Seen, first_asked
+from app.pipeline.stages.tracking import TrackingStage
 from app.processes.child import connection_to_parent, inherited_file
 from app.processes.remote import Remote, serve
 from app.processes.ring import Ring
 
 
 class Tracking(Protocol):
-    """The stage, wherever it is: messages go in, answers come back in their order."""
+    """The stage, wherever it is: messages go in, answers come back in their order, `first_asked` those to begin with."""
 
     opened: Opened
 
@@ -39,7 +40,7 @@ class TrackingHere:
     def __init__(self, config: Run) -> None:
         self._pictures: dict[int, Image] = {}
         self._stage = TrackingStage(config)
-        self._waiting: deque[Asked] = deque()
+        self._waiting = deque(first_asked())
         self.opened = self._stage.opened
 
     def send(self, asked: Asked) -> None:
@@ -69,14 +70,12 @@ class TrackingProcess:
     """The stage in a process of its own; a context manager that ends it.
 
     Args:
-        config: as for `TrackingStage`.
-        remote: the process.
+        remote: the process, which knows its source, and what it is asked first.
         pictures: the `shared_file` that it writes pictures to.
     """
 
-    def __init__(self, config: Run, remote: Remote, pictures: int) -> None:
+    def __init__(self, remote: Remote, pictures: int) -> None:
         self._remote = remote
-        self._remote.send(config)
         self.opened: Opened = self._remote.receive()
         self.ring = Ring(pictures, self.opened.size)
 

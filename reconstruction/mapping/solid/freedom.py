@@ -4,7 +4,8 @@ import numpy as np
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.mesh import triangulate
-from reconstruction.basis.modes import modal_basis, principal_axes
+from reconstruction.basis.modal_basis import principal_axes
+from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import Camera
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.solid import Solid

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import spsolve
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.mesh import triangulate
-from reconstruction.basis.modes import principal_axes
+from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.mapping.solid.bundle import Bundle, derivatives
 from reconstruction.window.robust import deviation

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from app.figures.modes_figure import boundary, modes_figure, spectrum
 from app.recording.modes import AMPLITUDE, View, brightness, displaced
-from reconstruction.basis.modes import ModalBasis, modal_basis
+from reconstruction.basis.modal_basis import ModalBasis
+from reconstruction.basis.modes import modal_basis
 from tests.synthetic_run import MODES, Run
 
 POINTS, FRAMES = 40, 12

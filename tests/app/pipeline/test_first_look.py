@@ -1,5 +1,6 @@
 """Where a run begins."""
 
+from collections import deque
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -76,9 +77,16 @@ def test_a_still_scene_says_so(tmp_path: Path) -> None:
 
 def test_no_more_of_a_live_source_is_kept_than_there_is_memory_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.pipeline.stages.first_look.MOST_BYTES", 5 * 240 * 320 * 3)
-    kept: list[Frame] = []
-    assert len(list(keeping(scene(), kept))) == 6
+    kept = deque[Frame]()
+    assert len(list(keeping(scene(), kept, ends=True))) == 6
     assert len(kept) == 6
+
+
+def test_a_file_of_large_pictures_is_read_again(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.pipeline.stages.first_look.MOST_BYTES", 5 * 240 * 320 * 3)
+    with Video(str(source)) as video:
+        look = first_look(Run(str(source)), video)
+        assert [frame.index for frame in look.frames] == list(range(BLACK, BLACK + 40))
 
 
 def test_nothing_to_follow_is_an_error(tmp_path: Path) -> None:

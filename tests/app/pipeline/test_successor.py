@@ -16,13 +16,14 @@ from app.options.model import Model
 from app.options.retexture import Retexture
 from app.options.run import Output, Run
 from app.pipeline.session import Session
-from app.pipeline.stages.tracking import Begun, Seen, first_points
+from app.pipeline.stages.messages import Begun, Seen
+from app.pipeline.stages.tracking import first_points
 from app.pipeline.stages.working_copy import WorkingCopy
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import AFTER_CUT_S, Successor, options_for_another
 from app.playback.playback import Playback
 from app.terminal.progress import Progress
-from reconstruction.mapping.mapper import at_once
+from reconstruction.mapping.mapper import FIRST_LATENCY, at_once
 from tests.app.command_line import Command, grain, in_own_process, turning, write_video
 from tests.synthetic_run import verify
 from tests.tracking.scene import SIZE, texture
@@ -36,6 +37,7 @@ CUT, FRAMES = 30, 130
 FAST = ("--rest-shape", "plane", "--bootstrap-frames", 5, "--points", 100, "--modes", 5)
 GOOD = (*FAST[:3], 20, *FAST[4:])
 WAIT, SOON = round(30 * AFTER_CUT_S), 15
+FIRST = 20 + int(FIRST_LATENCY * 20)  # frames until there is a model
 RED = np.full((20, 30, 3), (0, 0, 255), np.uint8)
 
 
@@ -91,7 +93,7 @@ def test_another_object_gets_a_part_with_a_model_of_its_own(film: Path) -> None:
 
     first, second = (Playback.load(film / name) for name in ("film.rrd", "film-part2.rrd"))
     begun = int(second.frames[0])
-    assert CUT + WAIT + 20 <= begun <= CUT + WAIT + 25
+    assert CUT + WAIT + FIRST <= begun <= CUT + WAIT + FIRST + 5
     assert [*first.frames, *second.frames] == list(range(FRAMES))
     assert first.shaped.tolist() == [frame < CUT for frame in range(begun)]
     assert set(first.phases[CUT:]) == {"lost"}
@@ -107,7 +109,7 @@ def test_another_object_gets_a_part_with_a_model_of_its_own(film: Path) -> None:
     assert first.summary["rest_shape_note"] == words["rest_shape_note"]
     assert second.summary["reprojection_rms_px"] < 0.5
 
-    for name, frames in (("", range(begun)), ("-object2", range(begun - 20, FRAMES))):
+    for name, frames in (("", range(begun)), ("-object2", range(begun - FIRST, FRAMES))):
         with np.load(film / f"shapes{name}.npz") as shapes, np.load(film / f"tracks{name}.npz") as tracks:
             assert shapes["frames"].tolist() == list(frames)
             assert len(tracks["W"]) == len(frames)

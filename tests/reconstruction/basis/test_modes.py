@@ -10,14 +10,8 @@ from hypothesis import strategies as st
 from reconstruction import ReconstructionError
 from reconstruction.basis import distances
 from reconstruction.basis.mesh import triangulate
-from reconstruction.basis.modes import (
-    ModalBasis,
-    doubly_centred,
-    leading_eigenpairs,
-    modal_basis,
-    principal_axes,
-    with_fixed_signs,
-)
+from reconstruction.basis.modal_basis import ModalBasis, principal_axes, with_fixed_signs
+from reconstruction.basis.modes import doubly_centred, leading_eigenpairs, modal_basis
 from reconstruction.settings import Metric
 from tests.reconstruction.world import SEEDS, flat, relief
 

@@ -11,7 +11,7 @@ from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaterni
 from reconstruction.mapping import mapper
 from reconstruction.mapping.keyframes import KEYFRAMES
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.mapper import FEWEST, LATENCY, RENEWED, Mapper, at_once, nearest_first
+from reconstruction.mapping.mapper import FEWEST, FIRST_LATENCY, LATENCY, RENEWED, Mapper, at_once, nearest_first
 from reconstruction.settings import FIRST_LOOKS, Settings
 
 POINTS = 20
@@ -73,7 +73,8 @@ def test_maps_made_elsewhere_are_in_force_after_a_fixed_number_of_frames() -> No
         return future
 
     first = FIRST_LOOKS[-1] - 1
-    assert adopted(Mapper(Settings(), soon, latency=LATENCY), range(first + LATENCY + 2))[:2] == [first, first + LATENCY]
+    used = Mapper(Settings(), soon, latency=LATENCY)
+    assert adopted(used, range(first + LATENCY + 2))[:2] == [first + int(FIRST_LATENCY * (first + 1)), first + LATENCY]
 
 
 def test_live_ones_are_in_force_as_soon_as_they_are_there() -> None:
