@@ -77,7 +77,7 @@ class GuardedTracker:
     """
 
     def __init__(self, image_bgr: Image, points_px: Array) -> None:
-        self._reference = self._image = image_bgr  # the first, and the last that showed the surface
+        self._reference = self._image = image_bgr  # the first, until it is described, and the last that showed the surface
         self._points = points_px
         self._tracker = PointTracker(image_bgr, points_px)
         self._left_behind = LeftBehind(points_px)
@@ -101,6 +101,7 @@ class GuardedTracker:
             how = f"only {share:.0%} of the points are seen"
             how += f", {just_now:.0%} just before: a cut or a jump" if jumped else ": it is covered or has left the picture"
             cut = jumped and not same_background(self._image, image_bgr, self._last_px)
+            self._image = self._image[:0].copy()
             return Guarded(self._nothing(), Change.LOST, how, cut)
         self._shares.append(share)
         self._image = image_bgr
@@ -112,6 +113,11 @@ class GuardedTracker:
         self._tracker.give_up(self._left_behind.points)
         how = f"{behind} points stay behind while the surface moves: they are given up"
         return Guarded(observation, reason=how, astray=self._left_behind.points.copy())
+
+    def seek(self, image_bgr: Image) -> Guarded:
+        """Look for the surface in any later frame, as thoroughly as if it had just been lost."""
+        self.frames_lost = 0
+        return self._search(image_bgr)
 
     def _search(self, image_bgr: Image) -> Guarded:
         self.frames_lost += 1
@@ -136,8 +142,8 @@ class GuardedTracker:
         self._shares.append(share)
         self._image = image_bgr
         self._last_px = np.where(found.visible[:, None], found.points_px, self._last_px)
-        lasted = f"after {frames} frame{'s' if frames > 1 else ''}"
-        return Guarded(found, Change.RECOVERED, f"found {how}, {share:.0%} of the points, {lasted}")
+        lasted = f", after {frames} frame{'s' if frames > 1 else ''}" if frames else ""
+        return Guarded(found, Change.RECOVERED, f"found {how}, {share:.0%} of the points{lasted}")
 
     def _regained(self, observation: Observation, image_bgr: Image) -> Observation:
         """With points that have come into sight far from where they were expected, if it is time to look for them."""
@@ -159,6 +165,7 @@ class GuardedTracker:
         """Finds the surface by its features; made when it is needed."""
         if self._relocalisation is None:
             self._relocalisation = Relocalisation(self._reference, self._points)
+            self._reference = self._reference[:0].copy()  # what is kept for long keeps no pictures
         return self._relocalisation
 
     @property

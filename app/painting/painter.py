@@ -6,6 +6,8 @@ from time import perf_counter
 from types import TracebackType
 from typing import Self
 
+import numpy as np
+
 from app.arrays import Array
 from app.files.video_out import VideoSink, writable_video
 from app.painting.compositing import Compositor
@@ -35,6 +37,7 @@ class Painter:
         self._files = ExitStack()
         self._video: VideoSink | None = None
         self._compositor: Compositor | None = None
+        self._first: tuple[Array, Compositor] | None = None  # the vertices of the first object, and what paints on it
         self._begun_s = 0.0
         self._elapsed_s = 0.0
         self.painted = 0
@@ -47,16 +50,18 @@ class Painter:
     def begin(self, first: Frame, points_px: Array, model: Model, fps: float) -> None:
         """The first frame, the vertices (p, 2) px in it, the model, and the rate of the video.
 
-        A second object is not painted: the picture was made for the first.
+        A second object is not painted: the picture was made for the first, and is painted on it again when it comes back.
 
         Raises:
             UsageError: the picture does not lie on the surface, or the video cannot be written.
         """
-        if self._video is not None:
-            self._compositor = None
+        if self._first is not None:
+            vertices, compositor = self._first
+            self._compositor = compositor if np.array_equal(points_px, vertices) else None
             return
         perspective = model.camera.perspective
         self._compositor = Compositor(first.image, points_px, model.mesh, perspective=perspective, placement=self.placement)
+        self._first = points_px, self._compositor
         height, width = first.image.shape[:2]
         self._video = self._files.enter_context(writable_video(self._out, (width, height), fps))
         self._begun_s = first.time_s

@@ -20,6 +20,8 @@ def final_pass(tracked: TrackedObject, recording: Recorder, progress: Progress) 
                         progress.log(note)
                         recording.tell("event", shape.index, shape.time_s, note)
                     recording.tell("rest", *tracked.surface.recorded)
+                if shape.index < tracked.since:  # in a file that is complete: another object has been followed since
+                    continue
                 recording.tell("estimate", shape.index, shape.time_s, shape.estimate)
                 progress.advance("final pass", tracked.collected.last_rms_px)
     except KeyboardInterrupt:

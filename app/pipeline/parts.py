@@ -33,6 +33,8 @@ class Parts:
         self._opened_s = time_s
         path, part = self._path, len(self.paths) + 1
         if path is not None and part > 1:
+            if options["image"] == "video":  # the video file is in the first part
+                options = {**options, "image": "jpeg"}
             path = beside(path, f"part{part}", overwrite=self._output.overwrite)
         self.paths += [path] if path else []
         watched = self._viewer is not None and answers(self._viewer)  # it may have been closed

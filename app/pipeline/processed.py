@@ -14,6 +14,15 @@ from tracking.video import Frame
 MOST_BYTES = 400 * 2**20  # of pictures that wait for shapes
 
 
+@dataclass(frozen=True)
+class FrameShape:
+    """The shape of a frame of the source."""
+
+    index: int
+    time_s: float
+    estimate: ShapeEstimate
+
+
 @dataclass(frozen=True, eq=False)
 class Surface:
     """What is followed, once it has a model.

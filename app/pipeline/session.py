@@ -12,16 +12,16 @@ from threadpoolctl import threadpool_limits
 from app.files.names import RECORDINGS, free_name
 from app.options.run import Run
 from app.pipeline.final_pass import final_pass
+from app.pipeline.others import Others
 from app.pipeline.parts import Parts
 from app.pipeline.prepare import check_files
-from app.pipeline.processed import InOrder, Processed, Surface
+from app.pipeline.processed import FrameShape, InOrder, Processed, Surface
 from app.pipeline.stages.launched import Launched
-from app.pipeline.stages.messages import Asked, Seen
+from app.pipeline.stages.messages import Seen
 from app.pipeline.stages.stages import Stages
 from app.pipeline.stopwatch import Stopwatch
-from app.pipeline.successor import Successor, options_for_another
 from app.pipeline.summary import Counts, RunSummary, summary_of
-from app.pipeline.tracked_object import FrameShape, TrackedObject
+from app.pipeline.tracked_object import TrackedObject
 from app.terminal.errors import UsageError, in_a_line
 from app.terminal.interrupts import completed, undisturbed
 from app.terminal.progress import Progress
@@ -31,7 +31,7 @@ from tracking.video import Frame
 
 
 class Session:
-    """A run over a video: one object, and another when that does not come back.
+    """A run over a video: one object, and when that does not come back, another, or one that was followed before.
 
     Args:
         config: what the person asked for.
@@ -57,7 +57,6 @@ class Session:
         check_files(config)
         self._watch, self._counts, self._order = Stopwatch(), Counts(), InOrder()
         self._surface: Surface | None = None
-        self._successor: Successor | None = None
         self.recordings, self.fps, self.interrupted = list[Path](), 0.0, False
 
     def run(self) -> RunSummary:
@@ -84,13 +83,14 @@ class Session:
             if first is None or second is None:
                 raise UsageError(f"{self._config.source} gives only one frame: give a video, or more --frames")
             self._object = self._first_object = self._begun(first)
+            self._others = Others(self._config, self._watch, self._begin_map)
             path = output.out or (free_name(RECORDINGS, self._config.source) if self._record_unnamed else None)
             with stages.recording(needed=needed) as self._recording, self._progress:
                 self._watch.start()
                 self._progress.expect(self._tracking.opened.frame_count)
                 self._parts = Parts(self._recording, path, output, self._progress.log)
                 self.recordings = self._parts.paths
-                self._parts.open(first.time_s, self._object.recording_options)
+                self._open_part(first)
                 self._recording.tell("region", first.index, first.time_s, first.begun(0).outline)
                 yield from self._objects(chain([first, second], iter(self._tracking.receive, None)))
 
@@ -104,9 +104,9 @@ class Session:
         """The frames of one object after another."""
         try:
             for seen in source:
-                if self._successor and self._successor.found:
+                if instead := self._others.instead(seen, self._object):
                     self._end_object(last=False)
-                    self._begin_another(seen)
+                    self._go_on_with(*instead, seen)
                 with completed():
                     self._process(seen)
                 yield from self._order.ready()
@@ -136,11 +136,8 @@ class Session:
             self._order.end(self._surface)
         phase = tracked.phase
         shapes = tracked.shape(seen.index, seen.time_s, guarded.observation)
-        expected_px = {tracked.number: tracked.expected_px}
-        if self._successor:
-            self._successor.look(seen, partial(self._tracking.picture, seen.number, keep=True))
-            expected_px |= self._successor.expected_px
-        self._tracking.send(Asked(expected_px))  # as early as can be: it is waited for
+        self._others.look(seen, partial(self._tracking.picture, seen.number, keep=True))
+        self._tracking.send(self._others.asked(seen, tracked))  # as early as can be: it is waited for
         with self._watch.time("record"):
             self._split_recording(seen)
             self._recording.observe(frame, seen.number, guarded.observation, phase=phase.value)
@@ -159,10 +156,9 @@ class Session:
         if guarded.change is Change.NONE:
             return
         if guarded.change is Change.LOST:
-            config = options_for_another(self._config, self._counts.objects + 1)
-            self._successor = Successor(config, seen, self._object.number, self._watch, self._begin_map, cut=guarded.cut)
+            self._others.lost(seen, self._counts.objects, cut=guarded.cut)
         else:
-            self._successor = None
+            self._others.recovered()
         self._note(seen.index, seen.time_s, f"{guarded.change.value} at frame {seen.index}: {guarded.reason}", "WARN")
 
     def _record(self, shapes: list[FrameShape]) -> None:
@@ -208,26 +204,25 @@ class Session:
                 self.interrupted = final_pass(self._object, self._recording, self._progress)
         finally:
             with undisturbed():
-                self._save()
+                self._save(last=last)
 
-    def _save(self) -> None:
-        """Record the summary of what is known, and write the files asked for."""
+    def _save(self, *, last: bool) -> None:
+        """Record the summary of what is known; at last, write the files asked for."""
         self.summary = self._summary(self._first_object)
         self._recording.tell("summary", self._summary(self._object).as_dict())
         if self._surface is not None:
             self._recording.tell("modes", *self._object.surface.recorded[:2])
             self._recording.tell("truth", self._object.true_shapes())
-        self._object.save()
+        self._others.keep(self._object)
+        if last:
+            self._others.save()
 
-    def _begin_another(self, frame: Seen) -> None:
-        """From this frame on the successor is followed, in a recording of its own."""
-        assert self._successor is not None
-        assert self._successor.found is not None
-        text = f"another object from frame {frame.index} on: {self._successor.history}"
+    def _go_on_with(self, tracked: TrackedObject, text: str, frame: Seen) -> None:
+        """From this frame on another object is followed, in a recording of its own."""
         self._note(frame.index, frame.time_s, text, "WARN")  # where one ends and
-        self._object, self._successor, self._surface = self._successor.found, None, None
-        self._counts.objects += 1
-        self._parts.open(frame.time_s, self._object.recording_options)
+        self._counts.objects += tracked.since == tracked.first.index  # not one that comes back
+        self._object, self._surface = tracked, None
+        self._open_part(frame)
         self._recording.tell("event", frame.index, frame.time_s, text, "WARN")  # where the other begins
         self._begin_surface(frame.index, frame.time_s)
 
@@ -235,8 +230,13 @@ class Session:
         """Go on in another file, if it is time, and no frame of this one waits for its shape."""
         if self._surface and not self._object.reconstruction.behind and self._parts.due(frame.time_s):
             self._recording.tell("summary", self._summary(self._object).as_dict())
-            self._parts.open(frame.time_s, self._object.recording_options)
+            self._open_part(frame)
             self._recording.tell("rest", *self._surface.recorded)
+
+    def _open_part(self, frame: Seen) -> None:
+        """Record the object in another file from this frame on."""
+        self._parts.open(frame.time_s, self._object.recording_options)
+        self._object.recordings += self._parts.paths[-1:]
 
     def _note(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:
         """Tell the person, and record it."""

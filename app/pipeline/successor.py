@@ -1,8 +1,7 @@
 """What is followed when an object does not come back: another one, if there is one that moves."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from itertools import count
 
 import numpy as np
 
@@ -33,7 +32,7 @@ class Successor:
     Args:
         config: what holds for the other object.
         lost: the frame in which the object was lost.
-        number: of the object that is lost.
+        numbers: for the objects that are tried.
         watch: to time it.
         start: begins to make models.
         cut: whether the object was lost in a cut.
@@ -42,12 +41,14 @@ class Successor:
         found: the other object, once it has a model.
     """
 
-    def __init__(self, config: Run, lost: Seen, number: int, watch: Stopwatch, start: Start, *, cut: bool) -> None:
+    def __init__(
+        self, config: Run, lost: Seen, numbers: Iterator[int], watch: Stopwatch, start: Start, *, cut: bool
+    ) -> None:
         self.found: TrackedObject | None = None
         self._lost = lost.index
         self._config, self._watch, self._start = config, watch, start
         self._due_s = lost.time_s + (AFTER_CUT_S if cut else AFTER_COVER_S)
-        self._numbers = count(number + 1)
+        self._numbers = numbers
         self._number: int | None = None  # of the one that is tried
         self._tried: TrackedObject | None = None
         self._moves = False
@@ -117,6 +118,5 @@ def options_for_another(config: Run, number: int) -> Run:
             output,
             tracks_out=output.tracks_out and beside(output.tracks_out, own, overwrite=output.overwrite),
             shapes_out=output.shapes_out and beside(output.shapes_out, own, overwrite=output.overwrite),
-            image="jpeg" if output.image == "video" else output.image,  # the video file is in the first part
         ),
     )

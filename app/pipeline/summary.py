@@ -96,6 +96,7 @@ class RunSummary(Summary):
         recording: the first file written.
         parts: number of files, if there are several.
         last_part: the last of them.
+        own_parts: those that show the object, if there was more than one.
     """
 
     source: str
@@ -131,12 +132,14 @@ class RunSummary(Summary):
     recording: Path | None = None
     parts: int | None = None
     last_part: Path | None = None
+    own_parts: tuple[str, ...] | None = None
 
     def print_short(self) -> None:
         """The verdict, and what it is about."""
         focal = "" if self.focal_px is None else f", focal length {self.focal_px:.0f} px"
         share = f", {self.visible_share:.0%} seen" if self.visible_share is not None else ""
         lost = f", lost {self.losses} times" if self.losses else ""
+        own = f"; this is the one in {' and '.join(self.own_parts)}" if self.own_parts else ""
         print_lines(
             f"{self.verdict}: {self.verdict_reason}",
             {
@@ -145,7 +148,7 @@ class RunSummary(Summary):
                 "error": None if self.reprojection_rms_px is None else f"{self.reprojection_rms_px:.2f} px, RMS",
                 "against the truth": None if self.score is None else f"e3d {self.score.e3d:.2%}",
                 "scale": None if self.mm_per_px is None else f"{self.mm_per_px:.4g} mm in a pixel of the first frame",
-                "objects": f"{self.objects}, one after another" if self.objects > 1 else None,
+                "objects": f"{self.objects}, one after another{own}" if self.objects > 1 else None,
                 "recording": self.recording if self.parts is None else f"{self.recording} to {self.last_part}",
             },
         )
@@ -204,4 +207,5 @@ def summary_of(
         recording=recordings[0] if recordings else None,
         parts=len(recordings) if several else None,
         last_part=recordings[-1] if several else None,
+        own_parts=tuple(map(str, tracked.recordings)) if counts.objects > 1 and tracked.recordings else None,
     )

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from app.files.writing import writable
 from app.options.run import Run, configuration
 from app.pipeline.estimates import Collected, Scores, save_shapes
 from app.pipeline.prepare import estimator
-from app.pipeline.processed import Surface
+from app.pipeline.processed import FrameShape, Surface
 from app.pipeline.quality.ruler import ruler
 from app.pipeline.stages.messages import LAG, Begun
 from app.pipeline.stopwatch import Stopwatch
@@ -24,15 +23,6 @@ from tracking.guarded import Change, Guarded
 from tracking.klt import Observation
 from tracking.tracks import Tracks, Truth
 from tracking.video import Frame
-
-
-@dataclass(frozen=True)
-class FrameShape:
-    """The shape of a frame of the source."""
-
-    index: int
-    time_s: float
-    estimate: ShapeEstimate
 
 
 class TrackedObject:
@@ -50,6 +40,8 @@ class TrackedObject:
     Attributes:
         config, number, first, points_px: the same.
         lost: whether it is lost.
+        since, last: frames of the source from which on it has been followed, and that showed it last.
+        recordings: the files that it is recorded in.
         reconstruction: its estimator.
         collected: its estimates.
         online: its estimates as they were shown on the way, if there was another pass; else None.
@@ -80,6 +72,8 @@ class TrackedObject:
         height, width = first.image.shape[:2]
         self.reconstruction = estimator(config, (width, height), points_px, start, frames)
         self.lost = False
+        self.since = self.last = first.index
+        self.recordings: list[Path] = []
         self._astray = np.zeros(len(points_px), np.bool_)
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
         stored = config.passes or config.output.tracks_out
@@ -129,6 +123,11 @@ class TrackedObject:
             "final_pass": self.config.passes,
         }
 
+    def come_back(self, index: int) -> None:
+        """It is followed again from a frame on, after another object was."""
+        self.since, self.lost = index, False
+        self.reconstruction.restart()
+
     def follow(self, seen: Begun | Guarded) -> Guarded:
         """What the next frame shows of it."""
         if isinstance(seen, Begun):
@@ -152,7 +151,7 @@ class TrackedObject:
         if self.lost:
             self.collected.lose(index)
             return self._of_frames(self.reconstruction.catch_up())
-        self._times[index] = time_s
+        self._times[index], self.last = time_s, index
         with self._watch.time("reconstruct"):
             return self._of_frames(self.reconstruction.update(observation.points_px.T, observation.visible))
 

@@ -203,8 +203,10 @@ class Recording:
             self._stream.static(small_multiples(basis, mesh))
 
     def truth(self, shapes: Mapping[int, Array]) -> None:
-        """True points (n, 3) of some frames, where the shapes are."""
+        """True points (n, 3) of some frames, where the shapes are; those of frames that are in other files are left out."""
         for index, true in shapes.items():
+            if index not in self._times:
+                continue
             with self._stream.frame(index, self._times[index]):
                 self._stream.row(entities.TRUTH, rr.Points3D.columns, **points(true, SEEN_RGB, -1.5))
 

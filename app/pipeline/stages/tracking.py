@@ -71,15 +71,25 @@ class TrackingStage:
             return None
         keep(self._number, frame.image)
         decoded, read_s = perf_counter(), self.video.arrived_s(frame)
-        self._trackers = {one: tracker for one, tracker in self._trackers.items() if one in asked.expected_px}
+        self._trackers = {
+            one: tracker for one, tracker in self._trackers.items() if one in {*asked.expected_px, *asked.kept}
+        }
         image = self._copy.picture(frame.image)
         objects = {one: self._object(one, frame.index, image, expected) for one, expected in asked.expected_px.items()}
+        objects |= {one: found for one in asked.kept if (found := self._earlier(one, image, sought=one == asked.sought))}
         tracked = perf_counter()
         told = tuple(self._told)
         del self._told[: len(told)]  # another thread may be adding
         milliseconds = {"decode": 1e3 * (decoded - began), "track": 1e3 * (tracked - decoded)}
         self._number += 1
         return Seen(self._number - 1, frame.index, frame.time_s, read_s, objects, told, milliseconds)
+
+    def _earlier(self, one: int, image: Image, *, sought: bool) -> Guarded | None:
+        """An object that was followed before, in the (copy of the) picture; None if nobody looks for it."""
+        tracker = self._trackers[one]
+        if tracker.lost and not sought:
+            return None
+        return self._copy.guarded(tracker.seek(image) if tracker.lost else tracker.track(image))
 
     def _object(self, one: int, index: int, image: Image, expected_px: Array | None) -> Begun | Guarded | TrackingError:
         """One of the objects in the (copy of the) picture of a frame of that index."""

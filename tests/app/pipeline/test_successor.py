@@ -1,15 +1,14 @@
 """After a cut to something else: it is followed in its own right, unless the object comes back, or nothing moves."""
 
 import json
-from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
+from itertools import count
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from app.commands.retexture import retexture
 from app.options.model import Model
@@ -24,21 +23,17 @@ from app.pipeline.successor import AFTER_CUT_S, Successor, options_for_another
 from app.playback.playback import Playback
 from app.terminal.progress import Progress
 from reconstruction.mapping.mapper import FIRST_LATENCY, at_once
-from tests.app.command_line import Command, grain, in_own_process, turning, write_video
+from tests.app.command_line import Command, grain, in_own_process, turning
+from tests.app.scenes import FAST, GOOD, RED, another, run, scenes
 from tests.synthetic_run import verify
 from tests.tracking.scene import SIZE, texture
 from tracking import TrackingError
 from tracking.guarded import Guarded, GuardedTracker
 from tracking.video import Video
 
-Image = NDArray[np.uint8]
-
 CUT, FRAMES = 30, 130
-FAST = ("--rest-shape", "plane", "--bootstrap-frames", 5, "--points", 100, "--modes", 5)
-GOOD = (*FAST[:3], 20, *FAST[4:])
 WAIT, SOON = round(30 * AFTER_CUT_S), 15
 FIRST = 20 + int(FIRST_LATENCY * 20)  # frames until there is a model
-RED = np.full((20, 30, 3), (0, 0, 255), np.uint8)
 
 
 @pytest.fixture(scope="module")
@@ -68,22 +63,6 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(autouse=True)
 def in_folder(here: Path) -> None:
     """Recordings go to a folder of their own."""
-
-
-def another(frames: int) -> Iterable[Image]:
-    """A sheet that fills the picture: on black, edges of two sheets look alike."""
-    return turning(frames, seed=5, scale=1.2)
-
-
-def scenes(path: Path, *pictures: Iterable[Image]) -> Path:
-    return write_video(path, (picture for scene in pictures for picture in scene))
-
-
-def run(video: Path, bootstrap_frames: int = 5, rest_shape: str = "plane", **output: object) -> dict[str, object]:
-    model = Model(modes=5, bootstrap_frames=bootstrap_frames)
-    written = Output(out=Path("run.rrd"), image="none", **output)  # type: ignore[arg-type]
-    config = Run(str(video), points=100, rest_shape=rest_shape, final_pass=False, model=model, output=written)
-    return Session(config, Progress()).run().as_dict()
 
 
 def test_another_object_gets_a_part_with_a_model_of_its_own(film: Path) -> None:
@@ -211,7 +190,7 @@ def test_what_is_covered_has_longer_than_what_was_cut(cut: bool, wait_s: float) 
     config = Run("video.mp4", points=100, rest_shape="plane", model=Model(modes=5, bootstrap_frames=5))
     pictures = list(another(60))
     lost = Seen(0, 0, 100.0, 0.0, {}, (), {})
-    successor = Successor(config, lost, 0, Stopwatch(), at_once, cut=cut)
+    successor = Successor(config, lost, count(1), Stopwatch(), at_once, cut=cut)
     trackers: dict[int, GuardedTracker] = {}
     whole = np.full(pictures[0].shape[:2], 255, np.uint8)
     for index, picture in enumerate(pictures):
@@ -237,4 +216,4 @@ def test_what_was_said_of_the_first_object_does_not_go_for_another() -> None:
     )
     other = options_for_another(config, 3)
     assert (other.rest_shape, other.ground_truth, other.texture, other.roi) == ("auto", None, None, (1, 2, 3, 4))
-    assert other.output == Output(tracks_out=Path("a/t-object3.npz"), image="jpeg")
+    assert other.output == Output(tracks_out=Path("a/t-object3.npz"), image="video")
