@@ -64,8 +64,12 @@ class State:
 
 def join(states: list[State]) -> State:
     """One state of all frames, in order."""
-    fields = ("q", "t", "log_s", "Lambda")
-    return State(*(np.concatenate([getattr(s, name) for s in states]) for name in fields))
+    return State(
+        np.concatenate([one.q for one in states]),
+        np.concatenate([one.t for one in states]),
+        np.concatenate([one.log_s for one in states]),
+        np.concatenate([one.Lambda for one in states]),
+    )
 
 
 def extrapolated(earlier: State, last: State) -> State:

@@ -12,7 +12,8 @@ from app.options.model import Model
 from app.options.run import Run
 from app.pipeline.stages.messages import RECOVERED
 from reconstruction.camera import Camera
-from reconstruction.mapping.mapper import LATENCY, Mapper, Start
+from reconstruction.mapping.mapper import LATENCY, Mapper
+from reconstruction.mapping.start import Start
 from reconstruction.online import Reconstruction
 from reconstruction.settings import RecoveredRestShape, Settings
 

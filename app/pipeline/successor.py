@@ -12,7 +12,7 @@ from app.pipeline.stages.messages import RECOVERED, Begun, Seen
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
 from reconstruction import ReconstructionError
-from reconstruction.mapping.mapper import Start
+from reconstruction.mapping.start import Start
 from reconstruction.online import Phase
 from tracking import TrackingError
 from tracking.klt import Observation

@@ -17,7 +17,7 @@ from app.pipeline.quality.ruler import ruler
 from app.pipeline.stages.messages import LAG, Begun
 from app.pipeline.stopwatch import Stopwatch
 from reconstruction.estimate import ShapeEstimate
-from reconstruction.mapping.mapper import Start
+from reconstruction.mapping.start import Start
 from reconstruction.online import Phase
 from tracking.guarded import Change, Guarded
 from tracking.klt import Observation

@@ -17,6 +17,7 @@ from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, select
 from reconstruction.mapping.solid.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
+from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import MORE_MODES, USUAL_MODES
 from reconstruction.state import State
 
@@ -88,7 +89,14 @@ class Map:
         return replace(self, rest=replace(self.rest, motion=motion), unit_px=factor * self.unit_px)
 
 
-def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool, known: Array | None = None) -> Map | None:
+def map_of(
+    W: Array,
+    visible: Mask,
+    camera: Camera,
+    estimate_focal: bool,
+    known: Array | None = None,
+    start: Start = at_once,
+) -> Map | None:
     """What keyframes W (K, 2, p) px with visibility (K, p) show, most different ones first; None where they do not tell.
 
     Args:
@@ -97,13 +105,16 @@ def map_of(W: Array, visible: Mask, camera: Camera, estimate_focal: bool, known:
         camera: its focal length may be a guess, if it is to be estimated.
         estimate_focal: whether the keyframes may change the focal length.
         known: the rest shape (3, p) so far, of any size.
+        start: where a part of the work is done, meanwhile.
     """
     if len(W) < FEWEST_KEYFRAMES:
         return None
     try:
         seen_by = lens(camera, W)
         whole = cache(lambda: sheet(W, visible, seen_by))
-        evidence = select(W, visible, camera, lambda parts: [through(by_part(whole(), part), W[part]) for part in parts])
+        evidence = select(
+            W, visible, camera, lambda parts: [through(by_part(whole(), part), W[part]) for part in parts], start
+        )
         if evidence.kind == "flat":
             return None
         if evidence.kind == "sheet":

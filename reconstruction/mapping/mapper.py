@@ -1,9 +1,7 @@
 """Mapping while frames come: the first model, and another one whenever the views have grown."""
 
-from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +11,7 @@ from reconstruction.mapping.bootstrap import bootstrap
 from reconstruction.mapping.keyframes import Keyframes, difference
 from reconstruction.mapping.map import Map, map_of
 from reconstruction.mapping.solid.bundle import Bundle
+from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import FIRST_LOOKS, Settings
 
 LATENCY = 90  # frames after which a map that another process makes is in force: three seconds of most videos
@@ -21,19 +20,6 @@ FEWEST = 10  # keyframes for a map
 FEWEST_POINTS = 4  # that a frame shows, for a first model
 GROWN = 1.3  # times as far apart as at the last map the keyframes are before there is another,
 RENEWED = 4 / 3  # or so many times as many frames have been keyframes
-
-Start = Callable[..., "Future[Any]"]
-"""Begins a call (function, *arguments) somewhere."""
-
-
-def at_once(function: Callable[..., Any], *arguments: object) -> "Future[Any]":
-    """A call made here and now."""
-    future: Future[Any] = Future()
-    try:
-        future.set_result(function(*arguments))
-    except Exception as error:
-        future.set_exception(error)
-    return future
 
 
 @dataclass(frozen=True)
@@ -124,7 +110,7 @@ class Mapper:
             return None
         if self._found is None or self._map_job or self._version != self._keyframes.version:
             W, visible, _ = self._keyframes.spread()
-            self._found = map_of(W, visible, camera, self._settings.estimate_focal, self._known) or self._found
+            self._found = map_of(W, visible, camera, self._settings.estimate_focal, self._known, self._start) or self._found
         return self._found and self._begin and nearest_first(self._found, *self._begin)
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:

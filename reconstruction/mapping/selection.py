@@ -24,6 +24,7 @@ from reconstruction.mapping.outliers import medians
 from reconstruction.mapping.solid.adjustment import Adjustment, adjust
 from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior
 from reconstruction.mapping.solid.solid import FEWEST_VIEWS, TAIL_SIGMAS, Solid, bundle_adjust
+from reconstruction.mapping.start import Start, at_once
 from reconstruction.window.robust import deviation
 
 Kind = Literal["flat", "solid", "sheet"]
@@ -97,7 +98,7 @@ class Evidence:
         return f"{self.kind}: left over on other keyframes {left}{lengths}; {solid}"
 
 
-def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = None) -> Evidence:
+def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = None, start: Start = at_once) -> Evidence:
     """Which kind of object keyframes (K, 2, p) px with visibility (K, p) show.
 
     Args:
@@ -105,6 +106,7 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
         visible: (K, p).
         camera: its focal length is taken as it is.
         surface: makes a sheet; without it, or with an orthographic camera, a sheet is not considered.
+        start: where rigid shapes are made meanwhile.
 
     Raises:
         ReconstructionError: too few keyframes for two halves.
@@ -118,11 +120,12 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     few = np.unique(points)
     views = [(w[:, :, few], h[:, few]) for w, h in seen]
     at = np.searchsorted(few, edges)
-    rigid = rigid_by(views[0], views[1], camera, at)
+    begun = start(rigid_by, views[0], views[1], camera, at)
     sheet, change = Misfit(np.nan, np.nan), np.nan
     if surface is not None:
         with suppress(ReconstructionError):  # no sheet, then
             sheet, change = sheet_misfit(surface(halves), seen, edges)
+    rigid: Rigid = begun.result()
     kind, sureness = decide(rigid, sheet)
     if sureness < PLAIN:
         rigid = both(rigid, rigid_by(views[1], views[0], camera, at))

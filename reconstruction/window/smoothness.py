@@ -10,18 +10,19 @@ from reconstruction.window.marginal import Previous
 from reconstruction.window.normal import Normal, diagonals
 
 
-def chain_of(energy: Energy, state: State, before: Previous | None) -> tuple[State, Array | None]:
-    """The window's frames, after the frame before them if the window is tied to it, and what that one knows of Λ'."""
+def neighbours(energy: Energy, state: State, before: Previous | None) -> tuple[State, State, Array | None]:
+    """Frames and their successors, the frame before the window among them if it is tied, and what that one knows of Λ'."""
     if before is None or not energy.tied:
-        return state, None
-    return join([before.state, state]), before.information
+        return state[:-1], state[1:], None
+    earlier = join([before.state, state[:-1]]) if len(state) > 1 else before.state
+    return earlier, state, before.information
 
 
 def add_smoothness_value(value: Array, energy: Energy, state: State, before: Previous | None) -> None:
     """Add to the value (n,) of each frame the cost of its change since the frame before."""
-    chain, information = chain_of(energy, state, before)
-    if len(chain) > 1:
-        value[len(state) - len(chain) + 1 :] += smoothness(energy, chain[:-1], chain[1:], information)
+    earlier, later, information = neighbours(energy, state, before)
+    if len(later):
+        value[len(state) - len(later) :] += smoothness(energy, earlier, later, information)
 
 
 def smoothness(energy: Energy, earlier: State, later: State, information: Array | None = None) -> Array:
@@ -67,14 +68,12 @@ def quaternion_tangent(q: Array) -> Array:
 
 def add_smoothness(normal: Normal, energy: Energy, state: State, before: Previous | None) -> None:
     """Differences of neighbours inside the window, and of the oldest frame to the one that has left it."""
-    chain, information = chain_of(energy, state, before)
-    earlier, later = chain[:-1], chain[1:]
+    earlier, later, information = neighbours(energy, state, before)
     n, d = len(later), normal.gradient.shape[1]
     if n == 0:
         return
     nearer = np.where((earlier.q * later.q).sum(axis=1) < 0, -1.0, 1.0)[:, None, None]
-    tangents = quaternion_tangent(chain.q)
-    J_earlier, J_later = -nearer * tangents[:-1], tangents[1:]
+    J_earlier, J_later = -nearer * quaternion_tangent(earlier.q), quaternion_tangent(later.q)
     delta = quaternion_difference(earlier.q, later.q)[:, :, None]
     change, weights = np.zeros((n, d)), np.zeros((n, d))
     change[:, 5], weights[:, 5] = later.log_s - earlier.log_s, energy.scale
@@ -83,7 +82,7 @@ def add_smoothness(normal: Normal, energy: Energy, state: State, before: Previou
         weights[0, POSE:] = 0.0
         normal.gradient[0, POSE:] += information @ change[0, POSE:]
         normal.diagonal[0, POSE:, POSE:] += information
-    inner = slice(len(chain) - len(state), n)  # the others tie frames of the window to each other
+    inner = slice(n + 1 - len(state), n)  # the others tie frames of the window to each other
     for J, sign, frames in ((J_later, 1.0, slice(n)), (J_earlier, -1.0, inner)):
         target = slice(len(state) - n, None) if sign > 0 else slice(len(state) - 1)
         Jt = energy.rotation * J[frames].transpose(0, 2, 1)

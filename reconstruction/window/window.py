@@ -103,14 +103,11 @@ class SlidingWindow:
         surprised = self._surprising(found)
         if surprised:
             found = self._other_bends(window, found)
-        window = with_newest(window, found.state)
-        if len(window) > 1:
-            window = minimise(self._energy, stack(self._data), window, self._before, STEP).state
-        found = self._reweighted(window, found, W, visible, weights)
-        newest = float(found.value[0])
+        window, found = self._reweighted(with_newest(window, found.state), found, W, visible, weights)
+        newest = float(found.value[-1])
         # After a surprise the new level is the usual one: it is not asked about twice.
         self._usual = newest if surprised else running_mean(self._usual, newest)
-        self.state = with_newest(window, found.state)
+        self.state = window
         if self._energy.adaptive:
             self._weigh_rest(self.state[-1:])
         return replace(self._estimate(W, visible, self._as_shown(self.state)), switch=self._switch)
@@ -194,17 +191,25 @@ class SlidingWindow:
         self._switch = switch_between(found, best)
         return best
 
-    def _reweighted(self, window: State, found: Solution, W: Array, visible: Mask, weights: Array) -> Solution:
-        """The newest frame adjusted again with robust weights by its residuals, until they hardly change."""
-        found = replace(found, state=window[-1:])
-        for _ in range(REWEIGHTINGS):
-            left = self.model.residuals(W, found.state) / self.model.radius_px
+    def _reweighted(
+        self, window: State, found: Solution, W: Array, visible: Mask, weights: Array
+    ) -> tuple[State, Solution]:
+        """The window adjusted with robust weights by its newest frame's residuals, again until they hardly change."""
+        for k in range(REWEIGHTINGS):
+            left = self.model.residuals(W, window) / self.model.radius_px
             before, weights = weights, robust_weights(left, visible)
-            if np.abs(weights - before).sum() < REWEIGHTED * len(weights):
+            changed = np.abs(weights - before).sum() >= REWEIGHTED * len(weights)
+            if changed:
+                self._data[-1] += image_statistics(self.model, W, weights - before)  # of few points
+            if k == 0 and len(window) > 1:  # all frames, once
+                found = minimise(self._energy, stack(self._data), window, self._before, STEP)
+                window = found.state
+            elif changed:
+                found = self._newest(window, solver=STEP)
+                window = with_newest(window, found.state)
+            else:
                 break
-            self._data[-1] += image_statistics(self.model, W, weights - before)  # of few points
-            found = self._newest(with_newest(window, found.state), solver=STEP)
-        return found
+        return window, found
 
     def _weigh_rest(self, newest: State) -> None:
         """Pull to rest by what the model leaves over: the noise, and what its modes cannot follow."""

@@ -9,7 +9,7 @@ from app.pipeline.stages.launched import Launched
 from app.pipeline.stages.maps import MapProcess
 from app.pipeline.stages.tracking_process import Tracking, TrackingHere, TrackingProcess
 from app.recording.process import RecordingHere, RecordingProcess
-from reconstruction.mapping.mapper import Start, at_once
+from reconstruction.mapping.start import Start, at_once
 
 
 class Stages:

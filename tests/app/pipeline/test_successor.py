@@ -22,7 +22,8 @@ from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import AFTER_CUT_S, Successor, options_for_another
 from app.playback.playback import Playback
 from app.terminal.progress import Progress
-from reconstruction.mapping.mapper import FIRST_LATENCY, at_once
+from reconstruction.mapping.mapper import FIRST_LATENCY
+from reconstruction.mapping.start import at_once
 from tests.app.command_line import Command, grain, in_own_process, turning
 from tests.app.scenes import FAST, GOOD, RED, another, run, scenes
 from tests.synthetic_run import verify

@@ -11,7 +11,8 @@ from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaterni
 from reconstruction.mapping import mapper
 from reconstruction.mapping.keyframes import KEYFRAMES
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.mapper import FEWEST, FIRST_LATENCY, LATENCY, RENEWED, Mapper, at_once, nearest_first
+from reconstruction.mapping.mapper import FEWEST, FIRST_LATENCY, LATENCY, RENEWED, Mapper, nearest_first
+from reconstruction.mapping.start import at_once
 from reconstruction.settings import FIRST_LOOKS, Settings
 
 POINTS = 20
