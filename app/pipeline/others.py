@@ -10,7 +10,7 @@ from app.pipeline.stages.messages import Asked, Seen
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.successor import Successor, options_for_another
 from app.pipeline.tracked_object import TrackedObject
-from reconstruction.mapping.mapper import Start
+from reconstruction.mapping.start import Start
 from reconstruction.online import Phase
 from tracking.guarded import Change, Guarded
 
