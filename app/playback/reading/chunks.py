@@ -25,18 +25,7 @@ LAST_KIND = 3
 
 
 class ChunkFile:
-    """A recording on disk, read in this process; an iterable of its chunks, which are read one at a time.
-
-    Args:
-        path: the .rrd file.
-
-    Attributes:
-        path: as given.
-        cut_off: whether it ends in the middle of a message; what is complete is read.
-
-    Raises:
-        UsageError: it is missing, not a recording, or not one of ours.
-    """
+    """A `RecordingFile` that is read in this process; an iterable of its chunks, which are read one at a time."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -68,7 +68,7 @@ def test_opencv_keeps_quiet(tmp_path: Path) -> None:
         "    try:\n        Video(source)\n    except TrackingError:\n        pass\n"
     )
     command = [sys.executable, "-c", code, str(AV1), str(tmp_path / "text.mp4"), "97"]
-    done = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, text=True, check=True)
+    done = subprocess.run(command, cwd=Path(__file__).parents[3], capture_output=True, text=True, check=True)
     assert done.stdout + done.stderr == ""
 
 

@@ -11,7 +11,7 @@ import pytest
 from tests.app.command_line import Command, Outcome, in_own_process
 from tests.synthetic_run import verify
 
-AV1 = Path(__file__).parents[2] / "tracking" / "data" / "av1.mp4"
+AV1 = Path(__file__).parents[3] / "tracking" / "sources" / "data" / "av1.mp4"
 POINTS = 40
 
 
