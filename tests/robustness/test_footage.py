@@ -38,7 +38,7 @@ def test_the_sample_holds(tmp_path: Path, name: str, losses: int) -> None:
     assert int(str(result.words["losses"])) <= losses
 
 
-@pytest.mark.slow
+@pytest.mark.whole
 @pytest.mark.parametrize("name", CASES)
 def test_the_printed_sheet_holds(shared_data: Path, tmp_path: Path, name: str) -> None:
     clip = Clip(shared_data / "kinect_paper.mp4", shared_data / "kinect_paper_gt.npz", KINECT_ROI, 113)
