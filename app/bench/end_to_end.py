@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from app.bench.drift import drift_px
 from app.bench.own_process import apart
 from app.bench.timing import Log
 
@@ -53,6 +54,8 @@ class WholeRun:
     peak_mb: float
     memory_mb: float
     """Of all processes, while frames go on."""
+    drift_px: float
+    """Median distance of tracked points from the truth."""
     unwritten_s: float
     """Longest time between two frames after which the file of the recording had grown."""
 
@@ -63,18 +66,20 @@ def whole_runs(*, quick: bool, log: Log) -> Iterator[WholeRun]:
 
     log("rendering the sample video")
     made = sample()
-    videos = [("demo", made.video, made.roi)]
+    videos = [("demo", made.video, made.truth, made.roi)]
     if KINECT.exists():
-        videos = [("kinect_paper", KINECT, KINECT_ROI), *videos]
-    for name, video, roi in videos[: 1 if quick else None]:
+        videos = [("kinect_paper", KINECT, KINECT.with_name("kinect_paper_gt.npz"), KINECT_ROI), *videos]
+    for name, video, truth, roi in videos[: 1 if quick else None]:
         for points in POINTS[: 1 if quick else None]:
             log(f"run of {name}, {points} points")
-            yield whole_run(name, video, roi, points, QUICK_FRAMES if quick else None)
+            yield whole_run(name, video, truth, roi, points, QUICK_FRAMES if quick else None)
 
 
-def whole_run(name: str, video: Path, roi: tuple[int, int, int, int], points: int, frames: int | None) -> WholeRun:
+def whole_run(
+    name: str, video: Path, truth: Path, roi: tuple[int, int, int, int], points: int, frames: int | None
+) -> WholeRun:
     """One run and its bare loop, in processes of their own."""
-    words = run_apart(video, roi, points, frames)
+    words = run_apart(video, truth, roi, points, frames)
     stamps = np.array(words["stamps"])
     bare = child("app.bench.bare_loop", str(video), *map(str, roi), str(points), str(len(stamps)))
     each_ms = 1e3 * np.diff(stamps)
@@ -94,6 +99,7 @@ def whole_run(name: str, video: Path, roi: tuple[int, int, int, int], points: in
         median_ms=float(np.median(each_ms)),
         p95_ms=float(np.percentile(each_ms, 95)),
         peak_mb=words["peak_mb"],
+        drift_px=words["drift_px"],
         unwritten_s=words["unwritten_s"],
     )
 
@@ -130,13 +136,15 @@ def evaluate_many() -> int:
     return MANY_POINTS
 
 
-def run_apart(video: Path, roi: tuple[int, int, int, int], points: int, frames: int | None) -> dict[str, Any]:
+def run_apart(video: Path, truth: Path, roi: tuple[int, int, int, int], points: int, frames: int | None) -> dict[str, Any]:
     """`modeshape run` in a process that notes when each frame is done."""
     with TemporaryDirectory(prefix="modeshape-") as folder:
         where = ["--roi", *map(str, roi), "--points", str(points), "--frames", f":{frames or ''}"]
-        arguments = [str(video), *where, "--out", str(Path(folder, "run.rrd"))]
+        tracks = Path(folder, "tracks.npz")
+        arguments = [str(video), *where, "--out", str(Path(folder, "run.rrd")), "--tracks-out", str(tracks)]
         started = time()
-        return child("app.bench.timed_run", *arguments) | {"started": started, "ended": time()}
+        words = child("app.bench.timed_run", *arguments) | {"started": started, "ended": time()}
+        return words | {"drift_px": drift_px(tracks, truth)}
 
 
 def help_s(log: Log) -> float:
@@ -172,6 +180,7 @@ def ratios(runs: list[WholeRun], help_seconds: float, many: tuple[int, float] | 
             f"latency_ms_{name}": run.latency_ms["median"],
             f"whole_s_{name}": run.whole_s,
             f"memory_mb_{name}": run.memory_mb,
+            f"drift_px_{name}": run.drift_px,
             f"unwritten_s_{name}": run.unwritten_s,
         }
     first = min(run.first_frame_s for run in runs if run.points == min(POINTS))

@@ -48,6 +48,7 @@ TARGETS = (
     Target("core_over_bare_kinect_paper_800", "the same over the bare OpenCV loop's, kinect_paper", 2),
     Target("latency_ms_kinect_paper_800", "From frame to mesh, median, kinect_paper from a file", 35, unit="ms"),
     Target("memory_mb_kinect_paper_800", "Memory of all processes, kinect_paper", 450, unit="MB"),
+    Target("drift_px_kinect_paper_800", "Tracked points from the truth, median, kinect_paper", 0.3, unit="px"),
     Target("p95_over_median_kinect_paper_800", "Frame times, kinect_paper: 95th percentile over median", 2),
     Target("p95_over_median_demo_800", "the same, demo", 2),
     Target("unwritten_s_kinect_paper_800", "Longest that nothing of it is written, kinect_paper", 2, unit="s"),
