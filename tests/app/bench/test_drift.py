@@ -10,7 +10,8 @@ from tracking.tracks import Tracks
 
 
 @pytest.mark.parametrize("off_px", [0.0, 0.5])
-def test_points_that_slide_drift(tmp_path: Path, rng: np.random.Generator, off_px: float) -> None:
+def test_points_that_slide_drift(tmp_path: Path, off_px: float) -> None:
+    rng = np.random.default_rng(3)
     start = rng.uniform(100, 400, (2, 60))
     bent = np.array([[1.0, 0.2], [-0.1, 0.9]])
     true = np.stack([start, bent @ start, bent @ start + 30.0])
