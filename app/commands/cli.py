@@ -62,7 +62,9 @@ def main() -> NoReturn:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of numbers: the verdict says what they are worth
-            sys.exit(carry_out(parse(sys.argv[1:])))
+            code = carry_out(parse(sys.argv[1:]))
+            atexit.register(finish)
+            sys.exit(code)
     except KeyboardInterrupt:
         atexit.register(finish)
         sys.exit(ExitCode.INTERRUPTED)

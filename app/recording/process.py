@@ -16,6 +16,7 @@ import numpy as np
 from app.processes.child import connection_to_parent, inherited_file
 from app.processes.ring import Ring
 from app.terminal.errors import UsageError
+from app.terminal.interrupts import undisturbed
 from tracking.video import Frame
 
 if TYPE_CHECKING:
@@ -170,7 +171,8 @@ class RecordingProcess:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         try:
-            self.close(failed=isinstance(error, Exception))
+            with undisturbed():  # else another Ctrl-C would end the process that completes the file
+                self.close(failed=isinstance(error, Exception))
         except Exception:
             if error is None:  # what ended the run matters more
                 raise

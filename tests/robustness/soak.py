@@ -66,21 +66,18 @@ class Memory(Thread):
     """Resident memory of this process and of all that it has begun, five times a second.
 
     Attributes:
-        at_s, total_mb: when, and all together.
-        peak_mb: of each process, by its command.
+        at_s, each_mb: when, and each by its module.
     """
 
     def __init__(self) -> None:
         super().__init__(daemon=True)
-        self.at_s, self.total_mb, self.peak_mb = list[float](), list[float](), dict[str, float]()
+        self.at_s, self.each_mb = list[float](), list[dict[str, float]]()
         self._end = Event()
 
     def run(self) -> None:
         while not self._end.wait(0.2):
-            now = dict(resident_mb())
+            self.each_mb.append(dict(resident_mb()))
             self.at_s.append(time.monotonic())
-            self.total_mb.append(sum(now.values()))
-            self.peak_mb |= {name: max(mb, self.peak_mb.get(name, 0.0)) for name, mb in now.items()}
 
     def end(self) -> None:
         """Measure no more."""
@@ -132,21 +129,27 @@ def soak(kind: str, count: int) -> list[str]:
         memory.end()
         video_mb, files_mb = (sum(p.stat().st_size for p in Path(name).glob(f"*{end}")) / 2**20 for end in (".mp4", ".rrd"))
         frames = [len(Playback.load(path).frames) for path in session.recordings]
-    at_s, total_mb = np.array(memory.at_s), np.array(memory.total_mb)
+    at_s = np.array(memory.at_s)
+    mb = {name: np.array([now.get(name, 0.0) for now in memory.each_mb]) for name in memory.each_mb[len(at_s) // 2]}
+    total_mb = np.sum(list(mb.values()), axis=0)
     warm, last = watcher.at_s[min(WARM, len(watcher.at_s) // 4)], watcher.at_s[-1]
-    before, during = np.median(total_mb[(at_s > warm) & (at_s < warm + 10)]), total_mb[(at_s > warm) & (at_s < last)]
+    early_on, later = (at_s > warm) & (at_s < warm + 10), (at_s > warm) & (at_s < last)
+    before, during = float(np.median(total_mb[early_on])), total_mb[later]
     step = np.diff(watcher.worked_s) * 1e3
     part = min(WARM, len(step) // 3)
     early, late = (float(np.median(step[one])) for one in (slice(part, 2 * part), slice(-part, None)))
-    recorder = max((mb for command, mb in memory.peak_mb.items() if "recording" in command), default=0.0)
+    recorder = max(float(one.max()) for name, one in mb.items() if "recording" in name)
     allowed = CHANGED * before if kind != "objects" else OBJECT_MB * count
     told = {name: words[name] for name in ("frames", "objects", "losses", "recoveries", "fps", "verdict", "verdict_reason")}
     lines = [
         json.dumps(told),
         f"{sum(frames)} frames in {len(frames)} recordings of {files_mb:.0f} MB (the video: {video_mb:.0f} MB)",
         f"all processes: {before:.0f} MB, later {during.min():.0f} to {during.max():.0f} MB; after the last frame at most "
-        f"{total_mb[at_s > last].max(initial=0.0):.0f} MB; each at most: "
-        + ", ".join(f"{command} {mb:.0f}" for command, mb in memory.peak_mb.items()),
+        f"{total_mb[at_s > last].max(initial=0.0):.0f} MB",
+        *(
+            f"{name}: {np.median(one[early_on]):.0f}, at last {one[later][-1]:.0f}, {one.max():.0f} MB"
+            for name, one in mb.items()
+        ),
         f"processor time of a frame in the run's own process: {early:.2f} ms, at the end {late:.2f} ms",
     ]
     complaints = {
