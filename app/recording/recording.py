@@ -13,6 +13,7 @@ import numpy as np
 import rerun as rr
 
 from app.arrays import Array, Image, Indices
+from app.files.on_disk import OnDisk
 from app.files.writing import check_free
 from app.recording import entities
 from app.recording.columns import Values, ours
@@ -78,7 +79,7 @@ class Recording:
         self._without_shape: set[int] = set()  # frames that said so
         self._model: Model | None = None
         self._textured: tuple[bytes, ...] | None = None
-        self._undrawn: dict[int, Shape] = {}
+        self._undrawn = OnDisk[Shape](Model, Strips)  # an hour's would fill the memory
         self._placed = False
         self._stages: set[str] = set()
         self._wanted = configuration.get("bootstrap_frames")
@@ -177,9 +178,9 @@ class Recording:
                 self._stream.row(entities.STATUS, rr.Points3D.columns, positions=np.empty((0, 3)), labels=[])
             shape = Shape.of(time_s, self._model, self._strips, estimate)
             if self._drawn_later:
-                self._undrawn[index] = shape
+                self._undrawn.add(index, shape)
             else:
-                self._undrawn.pop(index, None)
+                self._undrawn.forget(index)
                 draw(self._stream, shape)
 
     def timing(self, index: int, time_s: float, stage_ms: Mapping[str, float]) -> None:
@@ -221,11 +222,10 @@ class Recording:
             UsageError: it could not be written.
         """
         try:
-            for index, shape in self._undrawn.items():  # there was no final pass
+            for index, shape in self._undrawn.taken():  # there was no final pass
                 with self._stream.frame(index, shape.time_s):
                     draw(self._stream, shape)
         finally:
-            self._undrawn = {}
             self._stream.close(keep=keep and self._frames > 0)
 
     def __enter__(self) -> Self:

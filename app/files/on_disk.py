@@ -1,0 +1,59 @@
+"""Things by number in a temporary file: memory does not grow with them."""
+
+import pickle
+from collections.abc import Iterator
+from io import BytesIO
+from tempfile import TemporaryFile
+from typing import Any, Generic, TypeVar
+
+T = TypeVar("T")
+
+
+class OnDisk(Generic[T]):
+    """Things that are added, replaced, and taken once; pickled.
+
+    Args:
+        shared: types of their parts that many have in common; these stay in memory.
+    """
+
+    def __init__(self, *shared: type) -> None:
+        self._shared = shared
+        self._parts: list[object] = []
+        self._file = TemporaryFile()  # noqa: SIM115 (goes when this object goes)
+        self._places: dict[int, int] = {}  # in the file
+
+    def add(self, number: int, thing: T) -> None:
+        """Keep a thing; another one of that number is forgotten.
+
+        Raises:
+            OSError: the disk is full.
+        """
+        buffer = BytesIO()
+        pickler = pickle.Pickler(buffer, protocol=5)
+        pickler.persistent_id = self._number_of  # type: ignore[method-assign]
+        pickler.dump(thing)
+        self._places[number] = self._file.seek(0, 2)
+        self._file.write(buffer.getbuffer())
+
+    def forget(self, number: int) -> None:
+        """It is not wanted any more, if it is there."""
+        self._places.pop(number, None)
+
+    def taken(self) -> Iterator[tuple[int, T]]:
+        """All that are left, in the order in which their numbers came; each is forgotten."""
+        while self._places:
+            number = next(iter(self._places))
+            self._file.seek(self._places.pop(number))
+            unpickler = pickle.Unpickler(self._file)
+            unpickler.persistent_load = self._parts.__getitem__  # type: ignore[method-assign]
+            yield number, unpickler.load()
+
+    def _number_of(self, part: Any) -> int | None:
+        """Of a part that stays in memory; None for the others."""
+        if not isinstance(part, self._shared):
+            return None
+        for number, one in enumerate(self._parts):
+            if one is part:
+                return number
+        self._parts.append(part)
+        return len(self._parts) - 1
