@@ -31,6 +31,9 @@ class Output(Json, Overwrite):
     """Keep the shapes as they were shown on the way in the recording, too: beside those of the final pass."""
     image: Literal["jpeg", "video", "none"] = "jpeg"
     """How frames are stored in the recording: each as JPEG, the video file as it is, or not at all."""
+    color: Literal["depth", "strain", "curvature"] = "depth"
+    """What the mesh is coloured by in the view from the side: depth (with --uncertainty, that), strain (red is 5 % longer
+    than at rest), or curvature (red bulges to the camera, blue is hollow)."""
     view: bool = False
     """Open the viewer and watch live."""
     serve: bool = False

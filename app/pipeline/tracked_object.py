@@ -117,6 +117,7 @@ class TrackedObject:
             "configuration": configuration(self.config),
             "size": (width, height),
             "image": output.image,
+            "color": output.color,
             "video": Path(self.config.source),
             "overwrite": output.overwrite,
             "keep_online": output.keep_online and self.config.passes,

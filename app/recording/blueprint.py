@@ -26,7 +26,7 @@ def blueprint(*, live: bool = False) -> rrb.Blueprint:
             rrb.Vertical(
                 mesh_view("Mesh, from where the camera is", "/"),
                 rrb.Spatial3DView(
-                    name="From the side: near (blue) to far (red), or how uncertain (red)",
+                    name="From the side: near (blue) to far (red), or what was asked for",
                     origin="/",
                     contents=[f"+ /{entities.MESH}", f"+ /{entities.CAMERA}", f"+ /{entities.TRUTH}"],
                     overrides={entities.MESH: untextured()},

@@ -17,7 +17,7 @@ from app.files.on_disk import OnDisk
 from app.files.writing import check_free
 from app.recording import entities
 from app.recording.columns import Values, ours
-from app.recording.drawing import Shape, draw
+from app.recording.drawing import Shape, Tint, draw
 from app.recording.images import cropped, embedded_video, jpeg, texture
 from app.recording.modes import small_multiples
 from app.recording.stream import Stream
@@ -48,6 +48,7 @@ class Recording:
         image: how frames are stored: each as JPEG, the video file as it is, or not at all.
         video: the source's file, for image="video".
         overwrite: replace an existing file.
+        color: what the mesh is coloured by in the view from the side: how deep or uncertain it is, or how it is deformed.
         keep_online: keep the estimates from before the final pass beside those of it.
         final_pass: whether a final pass is to come: a file alone is drawn then, and holds nothing twice; a run that is
             killed leaves its estimates.
@@ -66,20 +67,21 @@ class Recording:
         image: Literal["jpeg", "video", "none"] = "jpeg",
         video: Path | None = None,
         overwrite: bool = False,
+        color: Literal["depth", "strain", "curvature"] = "depth",
         keep_online: bool = False,
         final_pass: bool = False,
     ) -> None:
         self.path = path
         self._estimates = (entities.ESTIMATE, entities.ONLINE) if keep_online else (entities.ESTIMATE,)
         self._models = 0
-        self._size, self._image = size, image
+        self._size, self._image, self._color = size, image, color
         self._video_ns: Indices = np.empty(0, np.int64)
         self._frames, self._times = 0, dict[int, float]()
         self._last_seen: Array = NOWHERE
         self._without_shape: set[int] = set()  # frames that said so
         self._model: Model | None = None
         self._textured: tuple[bytes, ...] | None = None
-        self._undrawn = OnDisk[Shape](Model, Strips)  # an hour's would fill the memory
+        self._undrawn = OnDisk[Shape](Model, Strips, Tint)  # an hour's would fill the memory
         self._placed = False
         self._stages: set[str] = set()
         self._wanted = configuration.get("bootstrap_frames")
@@ -143,6 +145,7 @@ class Recording:
         if not self._stream.open:
             return
         self._model, self._strips = Model(basis, mesh, camera), Strips(mesh.edges)
+        self._tint = None if self._color == "depth" else Tint(self._color, self._model)
         crop, origin = cropped(texture_bgr, texture_px)
         components = model_components(self._model, self._strips, self._size, texture_px, origin)
         self._stream.values(f"{entities.MODEL}/{self._models}", "Model", **components)
@@ -176,7 +179,7 @@ class Recording:
                 self._without_shape.remove(index)
                 self._stream.points(entities.LOST, NOWHERE)
                 self._stream.row(entities.STATUS, rr.Points3D.columns, positions=np.empty((0, 3)), labels=[])
-            shape = Shape.of(time_s, self._model, self._strips, estimate)
+            shape = Shape.of(time_s, self._model, self._strips, self._tint, estimate)
             if self._drawn_later:
                 self._undrawn.add(index, shape)
             else:

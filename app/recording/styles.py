@@ -36,7 +36,8 @@ HELP = """\
 
 **Mesh**: the surface in three dimensions, with the colours of the first frame, seen a little from the side of the camera.
 Drag to turn it, scroll to come nearer. Below it the same from the side: blue is near, red is far; with `--uncertainty`,
-white is sure, red is not. Green points are the truth, where there is one.
+white is sure, red is not; with `--color strain` or `curvature`, what is longer than at rest, or bulges to you, is red.
+Green points are the truth, where there is one.
 
 **Video**: each frame with the mesh on it. Green points were seen in the frame, orange ones are hidden and drawn where the
 model says they are, red ones are lost.

@@ -10,6 +10,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from app.recording.recording import entities
+from reconstruction.basis.surface import Surface
 from reconstruction.camera import Camera
 from tests.app.recording.rows import Rows, frame, read, record
 from tests.synthetic_run import MODES, SIZE, STAGE_MS, Run, verify, write_run
@@ -61,6 +62,16 @@ def test_what_is_unsure_is_red(run: Run, rows: Rows, tmp_path: Path) -> None:
     nearest, farthest = run.estimates[0].shape[2].argsort()[[0, -1]]
     assert depth[nearest] >> 8 & 255 > depth[nearest] >> 24  # bluer than red
     assert depth[farthest] >> 8 & 255 < depth[farthest] >> 24
+
+
+@pytest.mark.parametrize("by", ["strain", "curvature"])
+def test_what_is_longer_or_bulges_is_red_if_that_is_asked_for(by: str, tmp_path: Path) -> None:
+    run = write_run(tmp_path / "run.rrd", color=by)
+    colors = np.array(read(run.path)[entities.MESH, "Mesh3D:vertex_colors"][5], np.uint32)
+    values = getattr(Surface(run.basis.rest, run.mesh.faces), by)(run.estimates[5].shape)
+    redder = (colors >> 24).astype(int) - (colors >> 8 & 255).astype(int)
+    assert redder[values.argmax()] > 50
+    assert np.corrcoef(redder, values)[0, 1] > 0.9
 
 
 def test_observations_come_back(run: Run, rows: Rows) -> None:
