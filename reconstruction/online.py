@@ -14,8 +14,10 @@ from reconstruction.basis.model import Model, build_model
 from reconstruction.basis.rest_shape import RestShape, scaled_to
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
+from reconstruction.mapping.foresight import Foresight
 from reconstruction.mapping.map import Map, ratio_of_sizes
 from reconstruction.mapping.mapper import FEWEST_POINTS, Mapper
+from reconstruction.mapping.start import at_once
 from reconstruction.settings import Deformation, Metric, Settings
 from reconstruction.window import priors
 from reconstruction.window.energy import build_energy, build_guide
@@ -91,6 +93,7 @@ class Reconstruction:
         self._waiting: deque[Waiting] = deque()
         self._last: ShapeEstimate | None = None
         self._restart = False
+        self._foresight = Foresight(at_once)
 
     @property
     def phase(self) -> Phase:
@@ -177,11 +180,17 @@ class Reconstruction:
         Then all frames are worth another pass: the next one to `update` is the first again.
         """
         found = self._mapper.final(self._assumed) if self._mapper and self.window else None
-        if found is None:
+        if self._mapper is None or found is None:
             return False
+        self._foresight = Foresight(self._mapper.start)
         self._mapper = self._last = None
         self._adopt(found)
         return True
+
+    def foresee(self, frames: list[tuple[Array, Mask]]) -> None:
+        """Begin what can be done for the next frames, points (2, p) px with visibility (p,), before they come."""
+        if self.map is not None and self.deformation == "inextensible":
+            self._foresight.begin(self.map, frames)
 
     def _advance(self, most: int) -> list[ShapeEstimate]:
         """The shapes of at most so many of the frames that wait, oldest first."""
@@ -198,9 +207,11 @@ class Reconstruction:
         seen = frame
         if self.window.state is None and not frame.shows_enough:  # as in the first frame after it that does
             seen = next(one for one in self._waiting if one.shows_enough)
-        expected = None
+        expected, foreseen = None, self._foresight.next()
         if self.deformation == "inextensible":
-            expected = self.map.expected(self.window.model, seen.W, seen.visible, self.window.state)
+            if foreseen is None or seen is not frame:
+                foreseen = self.map.foreseen([(seen.W, seen.visible)])[0]
+            expected = self.map.expected(self.window.model, foreseen, self.window.state)
         self._last = self.window.advance(seen.W, seen.visible, expected)
         if seen is frame:
             return self._last

@@ -1,12 +1,18 @@
 """Tracks of a whole video in a temporary file: what is known of every frame, for another pass over all of them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from tempfile import TemporaryFile
+from typing import BinaryIO
 
 import numpy as np
 
+from app.arrays import Array
 from tracking.klt import Observation
+from tracking.tracks import Tracks
+
+AHEAD = 30  # frames that are told at a time
 
 
 @dataclass(frozen=True)
@@ -55,3 +61,24 @@ class StoredTracks:
             row = np.frombuffer(data, self._row)[0]
             observation = Observation(row["points"]["px"].copy(), row["points"]["visible"].copy())
             yield StoredFrame(int(row["index"]), float(row["time_s"]), observation, bool(row["lost"]))
+
+    def told_ahead(self, tell: Callable[[list[Observation]], None]) -> Iterator[StoredFrame]:
+        """The frames; those in which the object is not lost are told, some at a time, before their turn comes."""
+        frames = iter(self)
+
+        def told() -> list[StoredFrame]:
+            some = list(islice(frames, AHEAD))
+            tell([one.observation for one in some if not one.lost])
+            return some
+
+        now = told()
+        while now:
+            following = told()
+            yield from now
+            now = following
+
+    def save(self, file: BinaryIO, K: Array | None) -> None:
+        """Write them as a track file, with the camera (3, 3) if that is known."""
+        tracks = [stored.observation for stored in self]
+        W, visible = np.stack([o.points_px.T for o in tracks]), np.stack([o.visible for o in tracks])
+        Tracks(W, visible, K=K).save(file)

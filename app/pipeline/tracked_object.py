@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.arrays import Array, Image
+from app.arrays import Array, Flags, Image
 from app.files.stored_tracks import StoredFrame, StoredTracks
 from app.files.writing import writable
 from app.options.run import Run, configuration
@@ -21,7 +21,7 @@ from reconstruction.mapping.start import Start
 from reconstruction.online import Phase
 from tracking.guarded import Change, Guarded
 from tracking.klt import Observation
-from tracking.tracks import Tracks, Truth
+from tracking.tracks import Truth
 from tracking.video import Frame
 
 
@@ -76,8 +76,7 @@ class TrackedObject:
         self.recordings: list[Path] = []
         self._astray = np.zeros(len(points_px), np.bool_)
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
-        stored = config.passes or config.output.tracks_out
-        self._stored = StoredTracks(len(self.points_px)) if stored else None
+        self._stored = StoredTracks(len(points_px)) if config.passes or config.output.tracks_out else None
 
     @property
     def expected_px(self) -> Array | None:
@@ -172,7 +171,7 @@ class TrackedObject:
         assert self._stored is not None
         self.online, self.collected = self.collected, self._nothing()
         lost = False
-        for stored in self._stored:
+        for stored in self._stored.told_ahead(lambda some: self.reconstruction.foresee([*map(self._on_surface, some)])):
             if stored.lost:
                 self.collected.lose(stored.index)
                 lost = True
@@ -181,8 +180,11 @@ class TrackedObject:
                 self.reconstruction.restart()
                 lost = False
             self._times[stored.index] = stored.time_s
-            seen = stored.observation
-            yield from self._of_frames(self.reconstruction.update(seen.points_px.T, seen.visible & ~self._astray))
+            yield from self._of_frames(self.reconstruction.update(*self._on_surface(stored.observation)))
+
+    def _on_surface(self, seen: Observation) -> tuple[Array, Flags]:
+        """Points (2, P) px, and which of them are seen (P,) and on the surface."""
+        return seen.points_px.T, seen.visible & ~self._astray
 
     def score(self, collected: Collected | None) -> Scores | None:
         """Errors of estimates against the truth; None without one, or before there is a shape."""
@@ -220,11 +222,9 @@ class TrackedObject:
         path = self.config.output.tracks_out
         if not path or self._stored is None:
             return
-        tracks = [stored.observation for stored in self._stored]
-        W, visible = np.stack([o.points_px.T for o in tracks]), np.stack([o.visible for o in tracks])
         camera = self.reconstruction.camera
         with writable(path) as file:
-            Tracks(W, visible, K=camera.K if camera.perspective else None).save(file)
+            self._stored.save(file, camera.K if camera.perspective else None)
 
     def _save_shapes(self) -> None:
         path, collected = self.config.output.shapes_out, self.collected

@@ -28,6 +28,10 @@ RIGID = 0.005  # residual over the size, up to which a solid is rigid enough to 
 BESIDE = 4  # known points that say where an unknown one is
 
 
+Foreseen = tuple[Array, Mask]
+"""A sheet's shape (3, p) in a frame, and which of its points (p,) are known."""
+
+
 @dataclass(frozen=True)
 class Map:
     """What an object is.
@@ -50,18 +54,29 @@ class Map:
     focal_note: str = ""
     evidence: Evidence | None = None
 
-    def expected(self, model: Model, W: Array, visible: Mask, last: State | None) -> State | None:
-        """Pose and Λ' of a sheet in another frame, by its lengths; None for a solid, or with too few points.
+    def foreseen(self, frames: list[tuple[Array, Mask]]) -> list[Foreseen | None]:
+        """What `expected` finds in frames by themselves, points (2, p) px, anything where not visible (p,).
+
+        None for a solid, or with too few points.
+        """
+        if self.sheet is None:
+            return [None] * len(frames)
+        return [
+            self.sheet.shape_in(np.where(visible, W, 0.0), visible) if visible.sum() >= FEWEST_POINTS else None
+            for W, visible in frames
+        ]
+
+    def expected(self, model: Model, foreseen: Foreseen | None, last: State | None) -> State | None:
+        """Pose and Λ' of a sheet in another frame, by its lengths; None where nothing is foreseen.
 
         Args:
             model: the modes of the rest shape.
-            W: (2, p) px; anything where not visible.
-            visible: (p,).
+            foreseen: in that frame.
             last: the frame before, if there is one: what does not show stays, and orthographic depth keeps its sign.
         """
-        if self.sheet is None or visible.sum() < FEWEST_POINTS:
+        if self.sheet is None or foreseen is None:
             return None
-        found, known = self.sheet.shape_in(np.where(visible, W, 0.0), visible)
+        found, known = foreseen
         shape = self.unit_px * completed(found, self.rest.motion.shape)
         if last is not None and not self.camera.perspective:
             depth, before = shape[2] - shape[2].mean(), (last.matrices()[-1] @ model.B)[2]

@@ -42,14 +42,14 @@ class Mapper:
         live: whether frames do not wait for models: each is in force as soon as it is there.
 
     Attributes:
-        latency: the same.
+        start, latency: the same.
         first_frames: so many gave the first model.
     """
 
     def __init__(
         self, settings: Settings, start: Start = at_once, *, latency: int = 0, frames: int | None = None, live: bool = False
     ) -> None:
-        self._settings, self._start, self.latency, self._live = settings, start, latency, live
+        self._settings, self.start, self.latency, self._live = settings, start, latency, live
         self._frames = np.inf if frames is None else frames
         self._keyframes = Keyframes() if settings.maps else None
         self._frame = -1
@@ -110,7 +110,7 @@ class Mapper:
             return None
         if self._found is None or self._map_job or self._version != self._keyframes.version:
             W, visible, _ = self._keyframes.spread()
-            self._found = map_of(W, visible, camera, self._settings.estimate_focal, self._known, self._start) or self._found
+            self._found = map_of(W, visible, camera, self._settings.estimate_focal, self._known, self.start) or self._found
         return self._found and self._begin and nearest_first(self._found, *self._begin)
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
@@ -119,7 +119,7 @@ class Mapper:
         if self._first_job is None and (n in self._looks or self._looked < self._looks[-1] < n):
             arguments = *stacked(first), camera, self._settings, n >= self._looks[-1]
             due = self._frame + int(FIRST_LATENCY * n if self.latency else 0)
-            self._first_job = Job(self._start(bootstrap, *arguments), due)
+            self._first_job = Job(self.start(bootstrap, *arguments), due)
             self.first_frames = self._looked = n
 
     def _first_model(self) -> Map | None:
@@ -142,7 +142,7 @@ class Mapper:
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
             self._version, self._extent = keyframes.version, keyframes.extent
             arguments = *keyframes.spread()[:2], camera, self._settings.estimate_focal, self._known
-            self._map_job = Job(self._start(map_of, *arguments), self._frame + self.latency)
+            self._map_job = Job(self.start(map_of, *arguments), self._frame + self.latency)
 
     def _another(self, begin: tuple[Array, Mask]) -> Map | None:
         """The map, once it is in force, posed first as in the frame where it begins."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from app.files.stored_tracks import StoredFrame, StoredTracks
+from app.files.stored_tracks import AHEAD, StoredFrame, StoredTracks
 from tracking.klt import Observation
 
 
@@ -26,3 +26,20 @@ def test_frames_come_back_as_they_were() -> None:
 
 def test_nothing_stored_is_nothing_read() -> None:
     assert list(StoredTracks(3)) == []
+
+
+def test_frames_are_told_before_their_turn() -> None:
+    stored, told = StoredTracks(1), 0
+    for k in range(2 * AHEAD + 5):
+        stored.add(StoredFrame(k, k / 30, Observation(np.full((1, 2), k), np.ones(1, bool)), lost=k % 7 == 0))
+
+    def tell(some: list[Observation]) -> None:
+        nonlocal told
+        told += len(some)
+
+    seen = 0
+    for k, one in enumerate(stored.told_ahead(tell)):
+        assert one.index == k
+        seen += not one.lost
+        assert told >= min(seen + AHEAD // 2, 2 * AHEAD + 5 - 10)
+    assert told == seen

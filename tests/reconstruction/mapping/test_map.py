@@ -28,7 +28,7 @@ def expected_error(found: Map, W: np.ndarray, truth: np.ndarray) -> float:
     model = build_model(found.rest, found.camera, 20)
     shapes, state = [], None
     for w in W:
-        state = found.expected(model, w, np.ones(POINTS, bool), state)
+        state = found.expected(model, found.foreseen([(w, np.ones(POINTS, bool))])[0], state)
         assert state is not None
         shapes.append(model.estimate(0, w, np.ones(POINTS, bool), state).shape)
     return float(e3d(np.stack(shapes), truth).mean())
@@ -75,7 +75,7 @@ def test_a_solid() -> None:
     assert found.rest.kind == "rigid"
     assert e3d(found.rest.motion.shape[None], placed[:1])[0] < 0.03
     model = build_model(found.rest, found.camera, 10)
-    assert found.expected(model, W[0], np.ones(120, bool), None) is None
+    assert found.foreseen([(W[0], np.ones(120, bool))]) == [None]
 
 
 def test_a_map_in_another_size_is_the_same_picture() -> None:
@@ -85,7 +85,7 @@ def test_a_map_in_another_size_is_the_same_picture() -> None:
     images = []
     for one in (found, larger):
         model = build_model(one.rest, one.camera, 20)
-        state = one.expected(model, W[1], np.ones(POINTS, bool), None)
+        state = one.expected(model, one.foreseen([(W[1], np.ones(POINTS, bool))])[0], None)
         assert state is not None
         images.append(model.projection(state))
     np.testing.assert_allclose(images[0], images[1], atol=1e-3)

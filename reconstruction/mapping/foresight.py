@@ -1,0 +1,32 @@
+"""Shapes of a sheet in frames to come, made elsewhere while those before them have their turn."""
+
+from collections import deque
+from concurrent.futures import Future
+
+from reconstruction.arrays import Array, Mask
+from reconstruction.mapping.map import Foreseen, Map
+from reconstruction.mapping.start import Start
+
+
+class Foresight:
+    """What is foreseen, in the frames' order.
+
+    Args:
+        start: where it is made.
+    """
+
+    def __init__(self, start: Start) -> None:
+        self._start = start
+        self._begun = deque["Future[list[Foreseen | None]]"]()
+        self._made = deque[Foreseen | None]()
+
+    def begin(self, known: Map, frames: list[tuple[Array, Mask]]) -> None:
+        """Begin with the next frames, points (2, p) px with visibility (p,), by what is known of the object."""
+        if known.sheet is not None:
+            self._begun.append(self._start(known.foreseen, frames))
+
+    def next(self) -> Foreseen | None:
+        """Of the next frame, if it was begun."""
+        while not self._made and self._begun:  # there may be chunks without a frame
+            self._made.extend(self._begun.popleft().result())
+        return self._made.popleft() if self._made else None
