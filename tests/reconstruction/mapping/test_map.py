@@ -74,7 +74,6 @@ def test_a_solid() -> None:
     assert found is not None
     assert found.rest.kind == "rigid"
     assert e3d(found.rest.motion.shape[None], placed[:1])[0] < 0.03
-    model = build_model(found.rest, found.camera, 10)
     assert found.foreseen([(W[0], np.ones(120, bool))]) == [None]
 
 
