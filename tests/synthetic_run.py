@@ -84,7 +84,9 @@ def write_run(
         sigma = np.linspace(0.0, 8.0, len(pixels)) + index if unsure else None
         estimates.append(ShapeEstimate(index, *pose, Lambda, shape, projection, residual, visible, sigma=sigma))
     run = Run(path, image, pixels, camera, mesh, basis, observations, estimates)
-    configuration: Mapping[str, object] = {"source": "sheet.mp4", "modes": MODES}
+    configuration: Mapping[str, object] = {"source": "sheet.mp4", "modes": MODES} | {
+        name: value for name, value in options.items() if name == "image_width"
+    }
     with Recording(path, configuration=configuration, size=SIZE, **options) as recording:  # type: ignore[arg-type]
         for index in range(frames):
             time_s = index / 30

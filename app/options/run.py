@@ -10,6 +10,7 @@ from app.options.model import Model, priors_text
 from app.options.shared import FinalPass, Json, Overwrite
 from app.terminal.errors import UsageError
 
+NARROWEST = 16  # px, of pictures that are stored
 FEWEST_POINTS = 20  # of which a map is made
 
 
@@ -31,6 +32,8 @@ class Output(Json, Overwrite):
     """Keep the shapes as they were shown on the way in the recording, too: beside those of the final pass."""
     image: Literal["jpeg", "video", "none"] = "jpeg"
     """How frames are stored in the recording: each as JPEG, the video file as it is, or not at all."""
+    image_width: int | None = None
+    """Of the JPEGs, at most, px: smaller recordings of large pictures. Overlays and painted videos are as sharp as that."""
     color: Literal["depth", "strain", "curvature"] = "depth"
     """What the mesh is coloured by in the view from the side: depth (with --uncertainty, that), strain (red is 5 % longer
     than at rest), or curvature (red bulges to the camera, blue is hollow)."""
@@ -47,6 +50,8 @@ class Output(Json, Overwrite):
         return bool(self.connect or self.serve or self.view)
 
     def __post_init__(self) -> None:
+        if self.image_width is not None and not (self.image == "jpeg" and self.image_width >= NARROWEST):
+            raise UsageError(f"--image-width goes with --image jpeg, and is {NARROWEST} or more")
         if self.split_minutes is not None:
             if not self.split_minutes > 0:
                 raise UsageError(f"--split-minutes {self.split_minutes} is no time: give more than 0")

@@ -56,6 +56,13 @@ def decoded(blob: bytes) -> Image | None:
         return None
 
 
+def enlarged(image: Image | None, size: tuple[int, int] | None) -> Image | None:
+    """A picture as wide and high as it was, if it was made smaller."""
+    if image is None or size is None or image.shape[1::-1] == size:
+        return image
+    return cast(Image, cv2.resize(image, size, interpolation=cv2.INTER_LINEAR))
+
+
 def jpegs(file: RecordingFile, newest: dict[bytes, int]) -> Iterator[tuple[int, bytes]]:
     """Frame and JPEG of the rows that count, in the order of the file."""
     for entity, _, rows in file.pieces((entities.IMAGE, JPEG)):

@@ -14,7 +14,7 @@ import numpy as np
 from app.arrays import Array, Flags, Image, Indices
 from app.playback.documents import DOCUMENT, NAME, SCALARS, document, events, recording_name, stages
 from app.playback.frames import ESTIMATE, OBSERVATION, POSITIONS, Estimates, read_estimates, read_observations
-from app.playback.images import stored_images
+from app.playback.images import enlarged, stored_images
 from app.playback.model import MODEL, TEXTURE, RecordedModel, read_models, with_texture
 from app.playback.reading.file import RecordingFile
 from app.recording import entities
@@ -230,12 +230,13 @@ class Playback:
             UsageError: they are not all of one size.
         """
         size = self.recorded_model.size if self.recorded_model else None
+        stored = None if self.configuration.get("image_width") else size
         for i, image in stored_images(self.file, self.frames.tolist()):
             if image is not None:
-                size = size or (image.shape[1], image.shape[0])
-                if image.shape[1::-1] != size:
+                stored = stored or (image.shape[1], image.shape[0])
+                if image.shape[1::-1] != stored:
                     raise UsageError(f"{self.path} holds pictures of several sizes: run again to make another")
-            yield i, image
+            yield i, enlarged(image, size)
 
     @property
     def _known_model(self) -> RecordedModel:

@@ -18,8 +18,16 @@ from tracking.video import Video
 JPEG_QUALITY = 75  # of a video that was compressed before; 85 looks the same and takes 1.4 times as much
 
 
-def jpeg(image: Image) -> dict[str, Values]:
-    """An image (H, W, 3) BGR, compressed: a row of an EncodedImage."""
+def reduced(size: tuple[int, int], width: int | None) -> tuple[int, int]:
+    """The (width, height) of pictures of a size, no wider than a width."""
+    width = min(size[0], width or size[0])
+    return width, max(round(size[1] * width / size[0]), 1)
+
+
+def jpeg(image: Image, size: tuple[int, int]) -> dict[str, Values]:
+    """An image (H, W, 3) BGR, compressed, of another (width, height): a row of an EncodedImage."""
+    if size != image.shape[1::-1]:
+        image = cast(Image, cv2.resize(image, size, interpolation=cv2.INTER_AREA))
     encoded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
     return {"blob": rr.components.BlobBatch([encoded.tobytes()]).as_arrow_array(), "media_type": ["image/jpeg"]}
 

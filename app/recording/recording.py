@@ -18,7 +18,7 @@ from app.files.writing import check_free
 from app.recording import entities
 from app.recording.columns import Values, ours
 from app.recording.drawing import Shape, Tint, draw
-from app.recording.images import cropped, embedded_video, jpeg, texture
+from app.recording.images import cropped, embedded_video, jpeg, reduced, texture
 from app.recording.modes import small_multiples
 from app.recording.stream import Stream
 from app.recording.styles import SEEN_RGB, coefficient_styles, model_components, placement, points, styles, waiting_for
@@ -46,6 +46,7 @@ class Recording:
         size: (width, height) of the picture, px.
         connect: address of a running viewer, host:port or a rerun+http URL.
         image: how frames are stored: each as JPEG, the video file as it is, or not at all.
+        image_width: JPEGs are no wider than this, px.
         video: the source's file, for image="video".
         overwrite: replace an existing file.
         color: what the mesh is coloured by in the view from the side: how deep or uncertain it is, or how it is deformed.
@@ -65,6 +66,7 @@ class Recording:
         size: tuple[int, int],
         connect: str | None = None,
         image: Literal["jpeg", "video", "none"] = "jpeg",
+        image_width: int | None = None,
         video: Path | None = None,
         overwrite: bool = False,
         color: Literal["depth", "strain", "curvature"] = "depth",
@@ -73,30 +75,28 @@ class Recording:
     ) -> None:
         self.path = path
         self._estimates = (entities.ESTIMATE, entities.ONLINE) if keep_online else (entities.ESTIMATE,)
-        self._models = 0
         self._size, self._image, self._color = size, image, color
         self._video_ns: Indices = np.empty(0, np.int64)
-        self._frames, self._times = 0, dict[int, float]()
+        self._frames, self._models, self._times = 0, 0, dict[int, float]()
         self._last_seen: Array = NOWHERE
         self._without_shape: set[int] = set()  # frames that said so
         self._model: Model | None = None
         self._textured: tuple[bytes, ...] | None = None
         self._undrawn = OnDisk[Shape](Model, Strips, Tint)  # an hour's would fill the memory
-        self._placed = False
-        self._stages: set[str] = set()
+        self._placed, self._stages = False, set[str]()
+        self._image_size = reduced(size, image_width)
         self._wanted = configuration.get("bootstrap_frames")
 
         urls = [running_viewer(connect)] if connect else []
+        self._drawn_later = final_pass and not urls
         if image == "video":
             asset, self._video_ns = embedded_video(video)
-        if path is not None:
-            check_free(path, overwrite=overwrite)
-        self._drawn_later = final_pass and not urls
+        check_free(path, overwrite=overwrite)
         self._stream = Stream(path, urls)
         if path is not None:
             self._stream.name(path.stem)
         self._stream.document(entities.CONFIGURATION, "Configuration", configuration)
-        self._stream.static(styles())
+        self._stream.static(styles(np.divide(size, self._image_size)))
         if image == "video":
             self._stream.log(entities.IMAGE, asset)
 
@@ -108,7 +108,7 @@ class Recording:
             if self._frames == 1:
                 self._stream.row(entities.REGION, rr.LineStrips2D.columns, strips=NO_STRIPS)  # elsewhere by now
             if self._image == "jpeg":
-                self._stream.row(entities.IMAGE, rr.EncodedImage.columns, **jpeg(frame.image))
+                self._stream.row(entities.IMAGE, rr.EncodedImage.columns, **jpeg(frame.image, self._image_size))
             elif self._image == "video":
                 nanoseconds = self._video_ns[[min(frame.index, len(self._video_ns) - 1)]]
                 self._stream.row(entities.IMAGE, rr.VideoFrameReference.columns_nanos, nanoseconds=nanoseconds)

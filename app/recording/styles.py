@@ -52,8 +52,8 @@ The space bar plays and pauses; the arrow keys go frame by frame.
 """
 
 
-def styles() -> Iterator[tuple[str, Loggable]]:
-    """How points, lines and curves look."""
+def styles(shrunk: Array) -> Iterator[tuple[str, Loggable]]:
+    """How points, lines and curves look, and where pictures lie that have been made smaller by factors (2,)."""
     yield entities.HELP, rr.TextDocument(HELP, media_type=rr.MediaType.MARKDOWN)
     for entity in ("/", entities.WORLD):
         yield entity, rr.ViewCoordinates.RDF
@@ -66,7 +66,7 @@ def styles() -> Iterator[tuple[str, Loggable]]:
     yield entities.WIREFRAME, rr.LineStrips2D.from_fields(colors=[WIREFRAME_RGBA], radii=-0.5, draw_order=20)
     yield entities.REGION, rr.LineStrips2D.from_fields(colors=[PREDICTED_RGB], radii=-1.0, draw_order=25)
     # The viewer's pixels are squares between whole numbers; ours, like OpenCV's, have their centres there.
-    yield entities.IMAGE, rr.Transform3D(translation=(-0.5, -0.5, 0.0))
+    yield entities.IMAGE, rr.Transform3D(translation=(-0.5, -0.5, 0.0), scale=(*shrunk, 1.0))
     yield entities.ERROR, rr.SeriesLines(names=["RMS", "median"], colors=[LOST_RGB, PREDICTED_RGB])
     yield entities.VISIBLE, rr.SeriesLines(names="seen", colors=SEEN_RGB)
 
