@@ -30,7 +30,6 @@ class Relocalisation:
     def __init__(self, image_bgr: Image, points_px: Array) -> None:
         self._points = points_px
         self._extent = float(np.sqrt(2.0 * np.var(points_px, axis=0).sum())) * 2.0
-        self._sift = cv2.SIFT.create(PICTURE_FEATURES)
         mask = np.zeros(image_bgr.shape[:2], np.uint8)
         hull = cv2.convexHull(points_px.astype(np.float32).reshape(-1, 1, 2))
         cv2.fillConvexPoly(mask, np.rint(hull).astype(np.int32), (255,))
@@ -43,7 +42,7 @@ class Relocalisation:
             image_bgr: (H, W, 3) uint8.
             side_px: larger pictures are made smaller: to save time.
         """
-        places, described = self._features(image_bgr, self._sift, None, side_px)
+        places, described = self._features(image_bgr, cv2.SIFT.create(PICTURE_FEATURES), None, side_px)
         if len(places) < MIN_MATCHES or len(self._places) < MIN_MATCHES:
             return None
         matches = cv2.BFMatcher(cv2.NORM_L2).knnMatch(self._described, described, k=2)

@@ -4,7 +4,7 @@ import pickle
 from collections.abc import Iterator
 from io import BytesIO
 from tempfile import TemporaryFile
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, cast
 
 T = TypeVar("T")
 
@@ -39,14 +39,18 @@ class OnDisk(Generic[T]):
         """It is not wanted any more, if it is there."""
         self._places.pop(number, None)
 
+    def __getitem__(self, number: int) -> T:
+        self._file.seek(self._places[number])
+        unpickler = pickle.Unpickler(self._file)
+        unpickler.persistent_load = self._parts.__getitem__  # type: ignore[method-assign]
+        return cast(T, unpickler.load())
+
     def taken(self) -> Iterator[tuple[int, T]]:
         """All that are left, in the order in which their numbers came; each is forgotten."""
         while self._places:
             number = next(iter(self._places))
-            self._file.seek(self._places.pop(number))
-            unpickler = pickle.Unpickler(self._file)
-            unpickler.persistent_load = self._parts.__getitem__  # type: ignore[method-assign]
-            yield number, unpickler.load()
+            yield number, self[number]
+            self.forget(number)
 
     def _number_of(self, part: Any) -> int | None:
         """Of a part that stays in memory; None for the others."""

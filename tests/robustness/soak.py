@@ -145,8 +145,8 @@ def soak(kind: str, count: int) -> list[str]:
     lines = [
         json.dumps(told),
         f"{sum(frames)} frames in {len(frames)} recordings of {files_mb:.0f} MB (the video: {video_mb:.0f} MB)",
-        f"all processes: {before:.0f} MB, at last {after:.0f} MB, between {during.min():.0f} to {during.max():.0f} MB; after the last frame at most "
-        f"{total_mb[at_s > last].max(initial=0.0):.0f} MB",
+        f"all processes: {before:.0f} MB, at last {after:.0f} MB, between {during.min():.0f} and {during.max():.0f} MB; "
+        f"after the last frame at most {total_mb[at_s > last].max(initial=0.0):.0f} MB",
         *(
             f"{name}: {np.median(one[early_on]):.0f}, at last {one[later][-1]:.0f}, {one.max():.0f} MB"
             for name, one in mb.items()

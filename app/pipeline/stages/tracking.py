@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.arrays import Array, Image
+from app.files.on_disk import OnDisk
 from app.options.run import Run
 from app.pipeline.stages.first_look import first_look
 from app.pipeline.stages.messages import RECOVERED, Asked, Begun, Opened, Seen
@@ -48,6 +49,7 @@ class TrackingStage:
             self._told.append(f"points are followed in pictures of {width}x{height} px; --full-size takes all of them")
         self._frames: Iterator[Frame] | None = None
         self._trackers: dict[int, GuardedTracker] = {}
+        self._resting: dict[int, OnDisk[GuardedTracker]] = {}  # of objects that were followed before: 6 MB each
         self._number = 0
 
     @property
@@ -71,9 +73,9 @@ class TrackingStage:
             return None
         keep(self._number, frame.image)
         decoded, read_s = perf_counter(), self.video.arrived_s(frame)
-        self._trackers = {
-            one: tracker for one, tracker in self._trackers.items() if one in {*asked.expected_px, *asked.kept}
-        }
+        wanted = {*asked.expected_px, *asked.kept}
+        self._trackers = {one: tracker for one, tracker in self._trackers.items() if one in wanted}
+        self._resting = {one: tracker for one, tracker in self._resting.items() if one in asked.kept}
         image = self._copy.picture(frame.image)
         objects = {one: self._object(one, frame.index, image, expected) for one, expected in asked.expected_px.items()}
         objects |= {one: found for one in asked.kept if (found := self._earlier(one, image, sought=one == asked.sought))}
@@ -86,10 +88,19 @@ class TrackingStage:
 
     def _earlier(self, one: int, image: Image, *, sought: bool) -> Guarded | None:
         """An object that was followed before, in the (copy of the) picture; None if nobody looks for it."""
-        tracker = self._trackers[one]
-        if tracker.lost and not sought:
+        tracker = self._trackers.get(one)
+        if tracker is not None and not tracker.lost:
+            return self._copy.guarded(tracker.track(image))
+        if tracker is not None:
+            self._resting[one] = OnDisk[GuardedTracker]()
+            self._resting[one].add(one, self._trackers.pop(one))
+        if not sought:
             return None
-        return self._copy.guarded(tracker.seek(image) if tracker.lost else tracker.track(image))
+        tracker = self._resting[one][one]
+        found = self._copy.guarded(tracker.seek(image))
+        if not tracker.lost:
+            self._trackers[one] = tracker
+        return found
 
     def _object(self, one: int, index: int, image: Image, expected_px: Array | None) -> Begun | Guarded | TrackingError:
         """One of the objects in the (copy of the) picture of a frame of that index."""
