@@ -3,19 +3,22 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import cv2
 import numpy as np
 
 from app.arrays import Array
-from app.files.writing import check_free_folder, check_outputs, writable, writable_folder
+from app.files.writing import check_free_folder, check_outputs, moved_when_complete, writable, writable_folder
 from app.options.export import Export
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary
 from reconstruction.basis.surface import Surface
+
+if TYPE_CHECKING:
+    from app.files.scenes.gltf import MovingMesh
 
 FOLDERS = ("obj", "ply", "csv")  # formats with more than one file
 VIDEOS = ("mp4", "webm")
@@ -74,6 +77,8 @@ def export(command: Export, progress: Progress) -> Exported:
 
         if kind == "glb":
             write_glb(playback, out, command.color)
+        elif kind == "usdz":
+            write_usdz(playback, out, command.color)
         elif kind == "npz":
             from app.playback.tables import write_npz
 
@@ -100,9 +105,34 @@ def export(command: Export, progress: Progress) -> Exported:
     )
 
 
-def write_glb(playback: Playback, out: Path, color: Literal["picture", "strain", "curvature"] = "picture") -> None:
-    """An animated mesh; frames without a shape hold the last one."""
-    from app.files.gltf import MovingMesh, glb
+def write_glb(playback: Playback, out: Path, color: Literal["picture", "strain", "curvature"]) -> None:
+    """An animated mesh as glTF."""
+    from app.files.scenes.gltf import glb
+
+    moving = moving_mesh(playback, color)
+    with writable(out) as file:
+        file.write(glb(moving, playback.name))
+
+
+def write_usdz(playback: Playback, out: Path, color: Literal["picture", "strain", "curvature"]) -> None:
+    """An animated mesh as USD.
+
+    Raises:
+        UsageError: the library is not installed.
+    """
+    try:
+        from app.files.scenes import usd
+    except ImportError as error:
+        raise UsageError("USD needs a library of its own: pip install 'modeshape[usd]'") from error
+    moving = moving_mesh(playback, color)
+    with moved_when_complete(out) as part:
+        part.unlink()  # the library makes it
+        usd.write_usdz(moving, part, playback.name)
+
+
+def moving_mesh(playback: Playback, color: Literal["picture", "strain", "curvature"]) -> "MovingMesh":
+    """The surface in motion; frames without a shape hold the last one."""
+    from app.files.scenes.gltf import MovingMesh
 
     camera, (width, height) = playback.camera, playback.size
     s = held(playback.estimates.s)
@@ -113,7 +143,7 @@ def write_glb(playback: Playback, out: Path, color: Literal["picture", "strain",
         view = (2 * float(np.arctan(height / (2 * camera.focal_px))), width / height)
     else:
         origin, scale, view = np.column_stack([t, np.zeros(len(t))]), s, None
-    moving = MovingMesh(
+    return MovingMesh(
         basis=playback.basis,
         faces=playback.mesh.faces,
         uv=texture_coordinates(playback),
@@ -127,8 +157,6 @@ def write_glb(playback: Playback, out: Path, color: Literal["picture", "strain",
         unit_m=1e-3 if playback.unit == "millimetres" else None,
         colors=None if color == "picture" else greatest(playback, color),
     )
-    with writable(out) as file:
-        file.write(glb(moving, playback.name))
 
 
 def greatest(playback: Playback, what: Literal["strain", "curvature"]) -> Array:

@@ -1,1 +1,1 @@
-"""Files other than recordings: safe writing, videos, meshes, glTF."""
+"""Files other than recordings: safe writing, videos, meshes."""

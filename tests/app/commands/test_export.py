@@ -103,7 +103,7 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path, run: Run, kind: str, monkeyp
     monkeypatch.setattr(np, "savez_compressed", full)
     monkeypatch.setattr("app.playback.tables.table", full)
     monkeypatch.setattr("app.files.mesh_sequence.MeshSequence.add", full)
-    monkeypatch.setattr("app.files.gltf.glb", full)
+    monkeypatch.setattr("app.files.scenes.gltf.glb", full)
     with pytest.raises(UsageError, match="No space left"):
         exported(run.path, kind, tmp_path)
     assert not list(tmp_path.iterdir())

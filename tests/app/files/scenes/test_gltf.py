@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.files.gltf import MovingMesh, glb, normals
+from app.files.scenes.gltf import MovingMesh, glb, normals
 from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import rotation_from_quaternion

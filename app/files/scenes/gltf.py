@@ -24,7 +24,7 @@ import pygltflib as gltf
 from numpy.typing import NDArray
 
 from app.arrays import Array, Indices
-from app.files.gltf_buffer import Buffer
+from app.files.scenes.gltf_buffer import Buffer
 from reconstruction.basis.modal_basis import ROW_NAMES, ModalBasis
 from reconstruction.camera import rotation_from_quaternion
 

@@ -1,0 +1,1 @@
+"""Moving meshes as files for other programs."""
