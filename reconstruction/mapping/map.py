@@ -11,7 +11,7 @@ from reconstruction.basis.mesh import triangulate, unique_edges
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
-from reconstruction.mapping.isometric.adjustment import by_part, sheet, with_focal
+from reconstruction.mapping.isometric.adjustment import bundled, by_part, sheet, with_focal
 from reconstruction.mapping.isometric.focal import focal
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, select
@@ -133,7 +133,7 @@ def map_of(
         if evidence.kind == "flat":
             return None
         if evidence.kind == "sheet":
-            found = sheet_map(camera, whole(), evidence, estimate_focal=estimate_focal)
+            found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal)
         else:
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
@@ -171,13 +171,14 @@ def solid_map(
     return Map(rest, found.camera, modes=modes_held(W, visible, found, camera), evidence=evidence)
 
 
-def sheet_map(camera: Camera, found: IsometricSheet, evidence: Evidence, *, estimate_focal: bool) -> Map:
+def sheet_map(W: Array, camera: Camera, found: IsometricSheet, evidence: Evidence, *, estimate_focal: bool) -> Map:
     """The map of a sheet: its rest shape is the keyframe's shape that is nearest to all others."""
     if estimate_focal and camera.perspective:
         search = focal(found)
         if search.known:
             found = with_focal(found, search.focal_px)
             camera = found.camera
+    found = bundled(found, W)
     shapes = found.shapes()
     known = np.isfinite(shapes).all(axis=(0, 1))
     middle = medoid(shapes[:, :, known])

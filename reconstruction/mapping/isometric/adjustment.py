@@ -12,6 +12,7 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
+from reconstruction.mapping.isometric.bundle import places_moved
 from reconstruction.mapping.isometric.convex import convex_finish, convex_start
 from reconstruction.mapping.isometric.lengths import (
     Edges,
@@ -22,13 +23,14 @@ from reconstruction.mapping.isometric.lengths import (
     robust_lengths,
     usual,
 )
-from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_of
+from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_of, rays_of
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
 from reconstruction.mapping.isometric.warps import Warps, smooth_warps
 
 FUNCTIONS = 40
 START_FRAMES = 10  # of the convex start
+BUNDLE_ROUNDS = 8  # of shapes, then places and lengths: with much noise they are still getting better
 ROUNDS = 6  # at most, of starting frames again that do not fit
 OTHER_STARTS = 2
 FIRM_START = 100.0  # times the bending weight, before it is let go
@@ -88,6 +90,27 @@ def by_part(found: IsometricSheet, part: Indices) -> IsometricSheet:
 def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:
     """The same keyframes under another focal length, adjusted from the shapes there are, edges weighted as they are."""
     return by_part(replace(found, camera=replace(found.camera, focal_px=focal_px)), np.arange(len(found.coefficients)))
+
+
+def bundled(found: IsometricSheet, W: Array) -> IsometricSheet:
+    """The sheet with shapes, lengths and the places of its points on the reference image adjusted together.
+
+    Args:
+        found: what its keyframes say, image by image.
+        W: (F, 2, p) px, its keyframes; anything where not visible.
+    """
+    weights = found.warps.weights * found.warps.inlier / found.warps.noise_px[:, None] ** 2
+    W, shapes, placed = np.where(weights[:, None] > 0, W, 0.0), found.shapes(), found.warps.placed
+    rays = rays_of(W, found.camera)[:, :2, placed]
+    for _ in range(BUNDLE_ROUNDS):
+        C = found.bundled(shapes, W, weights)
+        places = found.warps.reference.copy()
+        slopes = found.warps.field.slopes_at(places[:, placed])[:, : C.shape[2]]
+        places[:, placed] += places_moved(C, rays, weights[:, placed], found.functions[placed], slopes)
+        found = found.moved(places)
+        found = replace(found, log_lengths=np.median(found.lengths.now(C)[1], axis=0))
+        shapes = C @ found.functions.T
+    return found.with_shapes(shapes)
 
 
 def described(

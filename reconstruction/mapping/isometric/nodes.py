@@ -49,11 +49,6 @@ def nodes_of(warps: Warps) -> Nodes:
     return Nodes(points, warps.reference[:, points], images, warps.variance(points), neighbours(images, NEIGHBOURS))
 
 
-def nodes_in(warps: Warps, nodes: Nodes) -> Nodes:
-    """The same nodes in other images."""
-    return replace(nodes, images=warps.images(nodes.points), variance=warps.variance(nodes.points))
-
-
 def rays_of(images: Array, camera: Camera) -> Array:
     """Rays (F, 3, m), third coordinate 1, of image points (F, 2, m) px."""
     xy = (images - camera.center_px[:, None]) / camera.focal_px

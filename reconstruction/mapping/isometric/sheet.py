@@ -1,18 +1,20 @@
 """What is known of a sheet that bends and does not stretch: its lengths, and its shapes in keyframes and elsewhere."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
+from reconstruction.mapping.isometric.bundle import FUNCTIONS, Lengths, data_normal, stepped
 from reconstruction.mapping.isometric.convex import convex_finish
-from reconstruction.mapping.isometric.lengths import Edges, best_start, usual
-from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_in, rays_of
+from reconstruction.mapping.isometric.lengths import best_start
+from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, rays_of
 from reconstruction.mapping.isometric.smooth_field import SmoothField
-from reconstruction.mapping.isometric.warps import Warps, quick_fit
+from reconstruction.mapping.isometric.warps import ENOUGH, Warps, quick_fit
 
-QUICK_STEPS = 4
+STEPS = 2  # of depths: they are only the start
 HELD = 0.03  # of the image's RMS radius: how far a point that is not seen may be off where its neighbours put it
 STUCK = 1.3  # times the usual frame's change of length: a frame that may be in another minimum
 
@@ -65,39 +67,72 @@ class IsometricSheet:
         """(F, 3, p) in camera axes as `shapes`, with the points where the keyframes W (F, 2, p) px saw them."""
         return np.exp(self.log_depths)[:, None] * rays_of(W, self.camera)
 
-    def finish(self, W: Array, visible: Mask, steps: int = 6) -> "IsometricSheet":
-        """The sheet in other frames W (F, 2, p) px, each by itself, its lengths known.
-
-        Each starts from the two keyframes that look most alike, and where both do badly from the deepest shape.
-        """
-        warps = self.warps.fit(W, visible)
-        nodes = nodes_in(warps, self.nodes)
-        c, edges = self._depths(nodes, steps)
-        off = edges.log_lengths(c) - self.log_lengths
-        return replace(self, warps=warps, nodes=nodes, coefficients=c, strain=edges.rms(off), change=usual(off))
-
     def shape_in(self, W: Array, visible: Mask) -> tuple[Array, Mask]:
-        """The shape in one more frame W (2, p) px, visible (p,): `finish` to 0.2 %, in half the time.
+        """The shape in one more frame W (2, p) px, visible (p,), its lengths known.
+
+        It starts from the two keyframes that look most alike, and where both do badly from the deepest shape.
 
         Returns:
             (3, p) in camera axes, and which of its points (p,) are known: seen, or held by those around them.
         """
         points = self.nodes.points
-        image, variance = quick_fit(self.warps, W, visible, points)
-        c, _ = self._depths(replace(self.nodes, images=image[None, :, points], variance=variance[None]), QUICK_STEPS)
+        image, variance, weights = quick_fit(self.warps, W, visible, points)
+        c = self._depths(replace(self.nodes, images=image[None, :, points], variance=variance[None]))
         held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
         known = visible | held[self.nodes.nearest(self.warps.reference)]
-        return np.asarray(np.exp(c @ self.values.T) * rays_of(image[None], self.camera)[0]), known
+        start = np.exp(c @ self.values.T) * rays_of(image[None], self.camera)[0]
+        C = self.bundled(start[None], W[None], weights[None])[0]
+        return np.asarray(np.where(self.warps.placed, C @ self.functions.T, np.nan)), known
 
-    def _depths(self, nodes: Nodes, steps: int) -> tuple[Array, Edges]:
-        """Coefficients (F, r) of log depths with which nodes keep their lengths in their images, and their edges."""
+    @property
+    def functions(self) -> Array:
+        """(p, R) those that shapes are made of."""
+        return self.warps.values[:, :FUNCTIONS]
+
+    @cached_property
+    def lengths(self) -> Lengths:
+        """Its edges."""
+        i, j = self.nodes.points[self.nodes.ends].T
+        slopes = self.functions[i] - self.functions[j]
+        return Lengths(slopes, self.log_lengths, self.edge_weights, self.warps.field.stiffness[:FUNCTIONS])
+
+    @cached_property
+    def projector(self) -> Array:
+        """(m, R) what takes the few points of shapes to their coefficients."""
+        return np.asarray(np.linalg.pinv(self.functions[self.warps.few]).T)
+
+    def bundled(self, shapes: Array, W: Array, weights: Array) -> Array:
+        """Coefficients (F, 3, R) of shapes (F, 3, p) adjusted once to points W (F, 2, p) px with weights (F, p) px⁻²."""
+        few, B = self.warps.few, self.functions
+        C = shapes[:, :, few] @ self.projector
+        rows = few if (weights[:, few] > 0).mean() > ENOUGH else np.arange(len(B))
+        rays = rays_of(W[:, :, rows], self.camera)[:, :2]
+        return stepped(C, data_normal(rays, weights[:, rows] * self.camera.focal_px**2, C, B[rows]), self.lengths)
+
+    def moved(self, places: Array) -> "IsometricSheet":
+        """The same with points at other places (2, p) of the reference image."""
+        warps, values = self.warps.moved(places), np.full_like(self.values, np.nan)
+        values[warps.placed] = self.field.at(places[:, warps.placed])
+        return replace(self, warps=warps, values=values, nodes=replace(self.nodes, reference=places[:, self.nodes.points]))
+
+    def with_shapes(self, shapes: Array) -> "IsometricSheet":
+        """The same with other shapes (F, 3, p) in its keyframes."""
+        few = self.warps.few
+        image = shapes[:, :2, few] / shapes[:, 2:, few] * self.camera.focal_px + self.camera.center_px[:, None]
+        to_images, to_depths = (np.linalg.pinv(B[few]) for B in (self.warps.values, self.values))
+        warps = replace(self.warps, coefficients=to_images @ image.transpose(0, 2, 1))
+        nodes = replace(self.nodes, images=warps.images(self.nodes.points))
+        return replace(self, warps=warps, nodes=nodes, coefficients=np.log(shapes[:, 2, few]) @ to_depths.T)
+
+    def _depths(self, nodes: Nodes) -> Array:
+        """Coefficients (F, r) of log depths with which nodes keep their lengths in their images."""
         edges = edges_between(nodes, self.values, self.camera).weighted(self.edge_weights)
         alike = nearest(nodes.images, self.nodes.images)[:, :2]
         starts = list(self.coefficients[alike].swapaxes(0, 1))
-        c = best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, steps)
+        c = best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, STEPS)
         stuck = np.flatnonzero(edges.rms(edges.log_lengths(c) - self.log_lengths) > STUCK * np.median(self.strain))
         if len(stuck):
             some, held, B = nodes.in_frames(stuck), edges.frames(stuck), self.values[nodes.points]
             deepest = convex_finish(some, held, self.nodes, self.coefficients, B, self.field.stiffness, self.camera)
-            c[stuck] = best_start(held, self.log_lengths, [c[stuck], deepest], self.field.stiffness, self.bend, steps)
-        return c, edges
+            c[stuck] = best_start(held, self.log_lengths, [c[stuck], deepest], self.field.stiffness, self.bend, STEPS)
+        return c

@@ -36,6 +36,15 @@ class SmoothField:
         flat = np.column_stack([np.ones(len(x)), x])
         return np.concatenate([flat, thin_plate(x, self.nodes) @ self.weights + flat @ self.affine], axis=1)
 
+    def slopes_at(self, points: Array) -> Array:
+        """Derivatives (n, r, 2) of all functions by the place of points (2, n) of the image."""
+        x = (points.T - self.centre) / self.radius
+        apart = x[:, None] - self.nodes
+        kernel = apart * (np.log((apart**2).sum(axis=2) + 1e-18) + 1)[:, :, None]
+        bent = np.einsum("nmk,mr->nrk", kernel, self.weights) + self.affine[1:].T
+        flat = np.broadcast_to(np.eye(3)[:, 1:], (len(x), 3, 2))
+        return np.concatenate([flat, bent], axis=1) / self.radius
+
 
 def thin_plate(x: Array, y: Array) -> Array:
     """Kernel (n, m) d² log d of the distances between points x (n, 2) and y (m, 2)."""

@@ -79,9 +79,11 @@ class Warps:
             noise_px=self.noise_px[chosen],
         )
 
-    def fit(self, W: Array, visible: Mask) -> "Warps":
-        """Smooth images of more frames W (F, 2, p) px."""
-        return fitted(self, W, visible, self.firmness)
+    def moved(self, places: Array) -> "Warps":
+        """The same functions, points with other places (2, p) on the reference image."""
+        values = np.zeros_like(self.values)
+        values[self.placed] = self.field.at(places[:, self.placed])
+        return replace(self, reference=places, values=values)
 
 
 def smooth_warps(W: Array, visible: Mask) -> Warps:
@@ -177,13 +179,11 @@ def robust_fit(
     return c, weights, inlier, usual
 
 
-def quick_fit(warps: Warps, w: Array, visible: Mask, points: Indices) -> tuple[Array, Array]:
-    """One more image w (2, p) px made smooth: as `robust_fit` does, but all points come in by one last step only.
-
-    Its normal matrix is that of the few, which are spread as all are.
+def quick_fit(warps: Warps, w: Array, visible: Mask, points: Indices) -> tuple[Array, Array, Array]:
+    """One more image w (2, p) px made smooth: as `robust_fit` does, but by the few points only.
 
     Returns:
-        (2, p) px of all points, variance (n,) px² of a coordinate of some of them.
+        (2, p) px of all points, variance (n,) px² of a coordinate of some of them, weights (p,) px⁻² of the observations.
     """
     B, stiffness, every = warps.values, warps.field.stiffness, np.flatnonzero(visible & warps.placed)
     some = spread_rows(visible & warps.placed, warps.few)
@@ -193,16 +193,12 @@ def quick_fit(warps: Warps, w: Array, visible: Mask, points: Indices) -> tuple[A
     for sweep in range(ROUGH_SWEEPS):
         c, _ = weighted_fit(rough, target, h, 0.1 ** (sweep + 1) * stiffness[:FEW_FUNCTIONS])
         h, _, _ = weights_of(target - rough @ c, finest)
-    held = warps.firmness * stiffness
-    c, gram = weighted_fit(few, target, h, held)
-    inverse = np.linalg.inv(gram)
-    left = w.T - B @ c
-    h, _, usual = weights_of(left[every], finest)
-    pull = np.zeros_like(left)
-    pull[every] = h[:, None] / h.sum() * left[every]
-    c += inverse @ (B.T @ pull - held[:, None] * c)
+    c, gram = weighted_fit(few, target, h, warps.firmness * stiffness)
+    image, weights = B @ c, np.zeros(len(B))
+    h, _, usual = weights_of(w[:, every].T - image[every], finest)
+    weights[every] = h / usual**2
     at = B[points]
-    return (B @ c).T, usual**2 / h.sum() * ((at @ inverse) * at).sum(axis=1)
+    return image.T, usual**2 / h.sum() * ((at @ np.linalg.inv(gram)) * at).sum(axis=1), weights
 
 
 def weighted_fit(B: Array, target: Array, h: Array, held: Array) -> tuple[Array, Array]:

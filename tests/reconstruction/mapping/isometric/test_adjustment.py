@@ -9,7 +9,7 @@ import pytest
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
-from reconstruction.mapping.isometric.adjustment import sheet
+from reconstruction.mapping.isometric.adjustment import bundled, sheet
 from reconstruction.mapping.isometric.focal import focal
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
@@ -25,6 +25,10 @@ def waving() -> tuple[np.ndarray, np.ndarray, IsometricSheet]:
 
 def error(found: IsometricSheet, truth: np.ndarray) -> float:
     return float(e3d(found.shapes(), truth).mean())
+
+
+def in_frames(found: IsometricSheet, W: np.ndarray) -> np.ndarray:
+    return np.stack([found.shape_in(w, np.ones(W.shape[2], bool))[0] for w in W])
 
 
 def test_shapes_come_out_of_the_images_alone() -> None:
@@ -55,16 +59,7 @@ def test_units_of_the_image_do_not_matter(unit: float) -> None:
 def test_frames_that_were_no_keyframes_are_finished_with_the_lengths_known() -> None:
     W, S, _ = waving()
     found = sheet(W[::2], SEEN[::2], CAMERA)
-    rest = found.finish(W[1::2], SEEN[1::2])
-    assert error(rest, S[1::2]) < 0.05
-
-
-def test_the_quick_shape_of_a_frame_is_that_of_finishing() -> None:
-    W, _, _ = waving()
-    found = sheet(W[::2], SEEN[::2], CAMERA)
-    finished = found.finish(W[1::2], SEEN[1::2]).shapes()
-    quick = np.stack([found.shape_in(w, h)[0] for w, h in zip(W[1::2], SEEN[1::2], strict=True)])
-    assert np.median(e3d(quick, finished)) < 0.01
+    assert float(e3d(in_frames(found, W[1::2]), S[1::2]).mean()) < 0.05
 
 
 def test_gaps_and_gross_errors_are_lived_with() -> None:
@@ -76,6 +71,19 @@ def test_gaps_and_gross_errors_are_lived_with() -> None:
     found = sheet(np.where(visible[:, None], W, np.nan), visible, CAMERA)
     assert error(found, S) < 0.05
     assert found.warps.inlier[gross & visible].mean() < 0.1
+
+
+def test_points_as_they_were_seen_and_lengths_adjusted_together_tell_more() -> None:
+    rng = np.random.default_rng(8)
+    W, S = waving_sheet(rng, frames=20, points=250, noise_px=0.5)
+    visible = rng.random((20, 250)) > 0.4
+    found = sheet(np.where(visible[:, None], W, np.nan), visible, CAMERA)
+    together = bundled(found, W)
+    assert error(together, S) < 0.85 * error(found, S)
+    i, j = found.nodes.points[found.nodes.ends].T
+    true = np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)).mean(axis=0)
+    before, after = (np.std(one.log_lengths - true) for one in (found, together))
+    assert after < 0.85 * before
 
 
 def test_points_of_something_else_count_for_little_and_spoil_nothing() -> None:
@@ -119,7 +127,7 @@ def test_what_cannot_be_done_is_said() -> None:
 def test_frames_in_another_minimum_are_found_again() -> None:
     W, S, found = waving()
     wrong = replace(found, coefficients=np.flip(found.coefficients, axis=0))  # every frame would start badly
-    assert error(wrong.finish(W, SEEN), S) < 0.03
+    assert float(e3d(in_frames(wrong, W), S).mean()) < 0.03
 
 
 def test_what_stretches_is_no_sheet() -> None:

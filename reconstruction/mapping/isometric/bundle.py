@@ -1,0 +1,93 @@
+"""Bundle adjustment of a sheet: shapes that keep its lengths and are where its points were seen, both at once.
+
+Smooth images and depths along their rays, found one after the other, are only the start: an image made smooth by itself
+does not know that the sheet keeps its lengths. A shape is S = C B, B smooth functions of the place on the reference image.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from reconstruction.arrays import Array
+
+FUNCTIONS = 60
+GIVE = 0.0025  # of lengths: what they change by, noise apart
+BEND = 1e3  # against the squared misfits: decides only where nothing is seen
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """Edges of a sheet made of smooth functions.
+
+    Attributes:
+        slopes: (n, R) the functions at one end less those at the other.
+        logs: (n,) logarithms of the lengths.
+        weights: (n,) 1 for edges that keep their length, near 0 for those that do not.
+        stiffness: (R,) bending energy of the functions.
+    """
+
+    slopes: Array
+    logs: Array
+    weights: Array
+    stiffness: Array
+
+    def now(self, C: Array) -> tuple[Array, Array]:
+        """Edges (F, 3, n) of shapes C (F, 3, R), and the logarithms (F, n) of their lengths."""
+        d = C @ self.slopes.T
+        return d, 0.5 * np.log(np.maximum((d**2).sum(axis=1), 1e-300))
+
+
+def data_normal(rays: Array, weights: Array, C: Array, B: Array) -> Array:
+    """Normal matrix (F, 3R, 3R) of shapes C (F, 3, R) whose points are seen along rays (F, 2, m), third coordinate 1.
+
+    How far a point is beside its ray, X − x Z, is linear in the shape, and 0 for the shape 0; over its depth as it is now
+    that is the error in the image.
+
+    Args:
+        rays: as above.
+        weights: (F, m) of squared errors in the image.
+        C: the shapes.
+        B: (m, R) the functions at the points.
+    """
+    x, y = rays[:, 0], rays[:, 1]
+    weights = weights / np.maximum(C[:, 2] @ B.T, 1e-3) ** 2  # depths are about 1
+    one, wx, wy, wz = ((B.T * (weights * by)[:, None]) @ B for by in (1.0, x, y, x**2 + y**2))
+    none = np.zeros_like(one)
+    rows = [[one, none, -wx], [none, one, -wy], [-wx, -wy, wz]]
+    return np.concatenate([np.concatenate(row, axis=2) for row in rows], axis=1)
+
+
+def stepped(C: Array, data: Array, lengths: Lengths) -> Array:
+    """Shapes C (F, 3, R) after a Gauss-Newton step towards their lengths, by the normal matrix of their data."""
+    F, _, R = C.shape
+    d, logs = lengths.now(C)
+    J = (d * np.exp(-2 * logs)[:, None])[:, :, None] * lengths.slopes.T  # (F, 3, R, n)
+    J = J.reshape(F, 3 * R, -1)
+    weighted = J * (lengths.weights / GIVE**2)
+    held = np.tile(BEND * lengths.stiffness + 1e-6, 3)
+    flat = C.reshape(F, 3 * R, 1)
+    normal = data + weighted @ J.transpose(0, 2, 1)
+    gradient = data @ flat + weighted @ (logs - lengths.logs)[:, :, None] + held[:, None] * flat
+    normal[:, np.arange(3 * R), np.arange(3 * R)] += held
+    return np.asarray(C - np.linalg.solve(normal, gradient).reshape(C.shape))
+
+
+def places_moved(C: Array, rays: Array, weights: Array, B: Array, slopes: Array) -> Array:
+    """How far (2, p) the places of points on the reference image are from where all frames see them.
+
+    Args:
+        C: (F, 3, R) shapes.
+        rays: (F, 2, p).
+        weights: (F, p) 0 where not seen.
+        B: (p, R) the functions at the points.
+        slopes: (p, R, 2) their derivatives by the place.
+    """
+    X = C @ B.T
+    along = np.einsum("fcr,prk->fcpk", C, slopes)
+    seen, depth = X[:, :2] / X[:, 2:], X[:, 2:, :, None]
+    J = (along[:, :2] - seen[:, :, :, None] * along[:, 2:]) / depth  # (F, 2, p, 2)
+    off = np.where(weights[:, None] > 0, rays - seen, 0.0)
+    H = np.einsum("fp,fcpk,fcpl->pkl", weights, J, J)
+    g = np.einsum("fp,fcpk,fcp->pk", weights, J, off)
+    H += np.trace(H, axis1=1, axis2=2).mean() / (2 * len(C)) * np.eye(2)  # as one frame more that sees it in place
+    return np.asarray(np.linalg.solve(H, g[:, :, None])[:, :, 0].T)
