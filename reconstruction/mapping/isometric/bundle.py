@@ -83,11 +83,12 @@ def places_moved(C: Array, rays: Array, weights: Array, B: Array, slopes: Array)
         slopes: (p, R, 2) their derivatives by the place.
     """
     X = C @ B.T
-    along = np.einsum("fcr,prk->fcpk", C, slopes)
-    seen, depth = X[:, :2] / X[:, 2:], X[:, 2:, :, None]
-    J = (along[:, :2] - seen[:, :, :, None] * along[:, 2:]) / depth  # (F, 2, p, 2)
+    seen, depth = X[:, :2] / X[:, 2:], X[:, 2:]
+    along = [C @ slope.T for slope in slopes.transpose(2, 0, 1)]
+    J = np.stack([(to[:, :2] - seen * to[:, 2:]) / depth for to in along])  # (2, F, 2, p)
+    weighted = J * weights[:, None]
     off = np.where(weights[:, None] > 0, rays - seen, 0.0)
-    H = np.einsum("fp,fcpk,fcpl->pkl", weights, J, J)
-    g = np.einsum("fp,fcpk,fcp->pk", weights, J, off)
+    H = np.array([[(one * other).sum(axis=(0, 1)) for other in J] for one in weighted]).transpose(2, 0, 1)
+    g = (weighted * off).sum(axis=(1, 2)).T
     H += np.trace(H, axis1=1, axis2=2).mean() / (2 * len(C)) * np.eye(2)  # as one frame more that sees it in place
     return np.asarray(np.linalg.solve(H, g[:, :, None])[:, :, 0].T)

@@ -39,11 +39,10 @@ class SmoothField:
     def slopes_at(self, points: Array) -> Array:
         """Derivatives (n, r, 2) of all functions by the place of points (2, n) of the image."""
         x = (points.T - self.centre) / self.radius
-        apart = x[:, None] - self.nodes
-        kernel = apart * (np.log((apart**2).sum(axis=2) + 1e-18) + 1)[:, :, None]
-        bent = np.einsum("nmk,mr->nrk", kernel, self.weights) + self.affine[1:].T
-        flat = np.broadcast_to(np.eye(3)[:, 1:], (len(x), 3, 2))
-        return np.concatenate([flat, bent], axis=1) / self.radius
+        apart = x.T[:, :, None] - self.nodes.T[:, None]  # (2, n, m)
+        bent = (apart * (np.log((apart**2).sum(axis=0) + 1e-18) + 1)) @ self.weights + self.affine[1:, None]
+        flat = np.broadcast_to(np.eye(3)[1:, None], (2, len(x), 3))
+        return np.asarray(np.concatenate([flat, bent], axis=2).transpose(1, 2, 0) / self.radius)
 
 
 def thin_plate(x: Array, y: Array) -> Array:
