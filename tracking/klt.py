@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from tracking import Array, Flags, Floats, Image, Indices
-from tracking.appearance import Appearance
+from tracking.appearance import Appearance, Fusion
 from tracking.consistency import MIN_SUPPORT, LocalMotion, Surroundings
 from tracking.flow import Flow, Grays
 
@@ -18,7 +19,9 @@ KEEP_SCORE = 0.5  # below in both pictures, a tracked point is given up
 CLEAR_SCORE = 0.8  # above in the fine picture, its drift is removed there
 BLURRED_SCORE = 0.65  # above in the half picture, it is removed there
 RETRIEVE_SCORE = 0.75  # above in one of them, a lost point is taken up again
-CORRECT_PX = 2.0  # larger "drift" is another place that looks alike
+SURE_PX = 0.5  # a point that the fine picture places so well needs no other word
+TAILS = 4.0  # degrees of freedom of how far neighbours miss a point
+CORRECT_PX = 2.0  # of the picture it is seen in: larger "drift" is another place that looks alike
 RETRIEVE_PX = 8.0  # how far from where it is expected a lost point may be found
 REFINE_STEPS = 2
 RETRIEVE_STEPS = 3
@@ -52,9 +55,8 @@ class PointTracker:
         self._reference = points_px.astype(np.float64)
         self._flow = Flow(self._reference)
         self._surroundings = Surroundings(self._reference)
-        fine, coarse = _pictures(self._grays)
-        self._fine = Appearance(fine, self._reference, PATCH_RADIUS)
-        self._coarse = Appearance(coarse, self._reference / 2.0, PATCH_RADIUS)
+        pictures = _pictures(self._grays)
+        self._levels = [Appearance(picture, self._reference / 2.0**k, PATCH_RADIUS) for k, picture in enumerate(pictures)]
         self._points = self._reference.copy()
         self._affine = np.broadcast_to(np.eye(2), (len(points_px), 2, 2)).copy()
         self._given_up = np.zeros(len(points_px), np.bool_)
@@ -73,13 +75,13 @@ class PointTracker:
                 are taken up again near there. None while there is no model: they are where their neighbours went.
         """
         grays = Grays.of(image_bgr)
-        fine, coarse = _pictures(grays)
+        pictures = _pictures(grays)
         points = self._flow.follow(self._grays, grays, self._points)
         motion = self._motion(points, predicted_px)
         points[~motion.consistent] = np.nan
-        points = self._refine(fine, coarse, points, motion)
-        points = self._retrieve(fine, coarse, points, self._expected(points, motion, predicted_px), motion)
-        points[self._given_up | ~_inside(points, fine.shape)] = np.nan
+        points = self._refine(pictures, points, motion)
+        points = self._retrieve(pictures, points, self._expected(points, motion, predicted_px), motion)
+        points[self._given_up | ~_inside(points, pictures[0].shape)] = np.nan
         self._grays, self._points, self._affine = grays, points, motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
 
@@ -100,14 +102,14 @@ class PointTracker:
         Args:
             expected_px: (P, 2) where the points are, to some pixels; NaN where that is not known.
         """
-        fine, coarse = _pictures(self._grays)
+        pictures = _pictures(self._grays)
         points = self._points
         for _ in range(RESUME_ROUNDS):  # what is found tells better where the others are
             sought = np.where(np.isfinite(points), points, expected_px + self._miss(points, expected_px))
             motion = self._motion(sought, None)
             expected = np.where(np.isfinite(points), np.nan, sought)
-            points = self._retrieve(fine, coarse, points, expected, motion)
-        points[self._given_up | ~_inside(points, fine.shape)] = np.nan
+            points = self._retrieve(pictures, points, expected, motion)
+        points[self._given_up | ~_inside(points, pictures[0].shape)] = np.nan
         self._points, self._affine = points, motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
 
@@ -119,27 +121,42 @@ class PointTracker:
             weight[helped] = PREDICTION_WEIGHT
         return self._surroundings.motion(points, weight, self._affine)
 
-    def _refine(self, fine: Floats, coarse: Floats, points: Array, motion: LocalMotion) -> Array:
+    def _refine(self, pictures: list[Floats], points: Array, motion: LocalMotion) -> Array:
         """Remove the drift of tracked points; drop those that look different."""
         points = points.copy()
         seen = np.flatnonzero(np.isfinite(points[:, 0]))
-        found = self._fine.align(fine, points[seen], motion.affine[seen], seen, REFINE_STEPS)
-        clear = found.score > CLEAR_SCORE
-        self._correct(points, seen[clear], found.points_px[clear])
+        fine = self._levels[0].align(pictures[0], points[seen], motion.affine[seen], seen, REFINE_STEPS)
+        clear = fine.score > CLEAR_SCORE
+        sure = clear & (fine.sigma_px < SURE_PX)
+        self._correct(points, seen[sure], fine.points_px[sure])
+        left = np.flatnonzero(~sure)
+        if len(left) == 0:
+            return points
+        clear, before, which = clear[left], fine.score_before[left], seen[left]
+        start, affine = points[which], motion.affine[which]
+        where = Fusion(start)
+        where.add(fine.points_px[left], fine.covariance[left], clear & _near(fine.points_px[left], start))
         # Blur makes fine patches unlike, those of the half picture much less; wrong places are unlike both.
-        seen, before = seen[~clear], found.score_before[~clear]
-        found = self._coarse.align(coarse, points[seen] / 2.0, motion.affine[seen], seen, REFINE_STEPS)
-        # A point that its neighbours do not check must look more alike.
-        keep = np.where(motion.support[seen] >= MIN_SUPPORT, KEEP_SCORE, RETRIEVE_SCORE)
-        same = (before > keep) | ((found.score_before > keep) & (before > 0.0))
-        points[seen[~same]] = np.nan
-        blurred = found.score > BLURRED_SCORE
-        self._correct(points, seen[blurred], 2.0 * found.points_px[blurred])
+        # Without texture a patch says little, or only across an edge; larger ones and the neighbours say more.
+        for level, least in ((1, BLURRED_SCORE), (2, CLEAR_SCORE)):
+            scale = 2.0**level
+            found = self._levels[level].align(pictures[level], start / scale, affine, which, REFINE_STEPS)
+            if level == 1:
+                # A point that its neighbours do not check must look more alike.
+                keep = np.where(motion.support[which] >= MIN_SUPPORT, KEEP_SCORE, RETRIEVE_SCORE)
+                same = clear | (before > keep) | ((found.score_before > keep) & (before > 0.0))
+            good = (found.score > least) & _near(found.points_px, start / scale)
+            where.add(scale * found.points_px, scale**2 * found.covariance, good)
+        # What the surface does between its points has heavy tails, as Student's t has them.
+        away = ((motion.fitted_px[which] - start) ** 2).sum(axis=1)
+        usual = ((TAILS * motion.scale_px**2 + away) / (TAILS + 2.0))[:, None, None] * np.eye(2)
+        where.add(motion.fitted_px[which], usual, motion.support[which] >= MIN_SUPPORT)
+        points[which] = np.where(same[:, None], where.points_px, np.nan)
         return points
 
     def _correct(self, points: Array, which: Indices, aligned: Array) -> None:
         """Move points in place to their aligned positions where these are near; NaN stays."""
-        near = np.linalg.norm(aligned - points[which], axis=1) < CORRECT_PX
+        near = _near(aligned, points[which])
         points[which[near]] = aligned[near]
 
     def _expected(self, points: Array, motion: LocalMotion, predicted_px: Array | None) -> Array:
@@ -169,14 +186,14 @@ class PointTracker:
         count = seen.sum(axis=1)[:, None]
         return np.where(count > 0, local / np.maximum(count, 1), np.median(miss[known], axis=0))
 
-    def _retrieve(self, fine: Floats, coarse: Floats, points: Array, expected: Array, motion: LocalMotion) -> Array:
+    def _retrieve(self, pictures: list[Floats], points: Array, expected: Array, motion: LocalMotion) -> Array:
         """Re-acquire points near where they are expected, if they look alike and move like their neighbours."""
-        sought = np.flatnonzero(_inside(expected, fine.shape))
+        sought = np.flatnonzero(_inside(expected, pictures[0].shape))
         if len(sought) == 0:
             return points
         affine = motion.affine[sought]
-        rough = self._coarse.align(coarse, expected[sought] / 2.0, affine, sought, RETRIEVE_STEPS)
-        found = self._fine.align(fine, 2.0 * rough.points_px, affine, sought, RETRIEVE_STEPS)
+        rough = self._levels[1].align(pictures[1], expected[sought] / 2.0, affine, sought, RETRIEVE_STEPS)
+        found = self._levels[0].align(pictures[0], 2.0 * rough.points_px, affine, sought, RETRIEVE_STEPS)
         near = np.linalg.norm(found.points_px - expected[sought], axis=1) < RETRIEVE_PX
         good = near & (np.maximum(found.score, rough.score) > RETRIEVE_SCORE)
         points = points.copy()
@@ -186,6 +203,11 @@ class PointTracker:
         return points
 
 
+def _near(points: Array, others: Array) -> Flags:
+    """Which points (n, 2) are near others (n, 2), in pixels of the picture that they were sought in."""
+    return np.asarray(np.linalg.norm(points - others, axis=1) < CORRECT_PX)
+
+
 def _inside(points: Array, shape: tuple[int, ...]) -> Flags:
     """Which points (n, 2) are in the picture, away from its border; NaN is not."""
     limit = np.array([shape[1], shape[0]]) - 1.0 - BORDER_PX
@@ -193,6 +215,6 @@ def _inside(points: Array, shape: tuple[int, ...]) -> Flags:
     return inside[:, 0] & inside[:, 1]
 
 
-def _pictures(grays: Grays) -> tuple[Floats, Floats]:
-    """The picture and its half, as float32."""
-    return grays.full.astype(np.float32), grays.half.astype(np.float32)
+def _pictures(grays: Grays) -> list[Floats]:
+    """The picture, its half and its quarter, as float32."""
+    return [picture.astype(np.float32) for picture in (grays.full, grays.half, cv2.pyrDown(grays.half))]

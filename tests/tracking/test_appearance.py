@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from tests.tracking.scene import SIZE, moved, texture, tilt
-from tracking.appearance import Appearance
+from tracking.appearance import Appearance, Fusion
 from tracking.features import detect_corners
 from tracking.region.mask import region_mask
 
@@ -53,3 +53,25 @@ def test_a_subset_keeps_its_own_patches() -> None:
     np.testing.assert_allclose(found.points_px, POINTS[which], atol=0.05)
     nothing = appearance.align(picture(IMAGE), np.empty((0, 2)), np.empty((0, 2, 2)), ALL[:0], 3)
     assert nothing.points_px.shape == (0, 2)
+
+
+def test_along_an_edge_a_place_is_unsure() -> None:
+    image = np.full(SIZE[::-1], 100, np.float32)
+    image[:, 160:] = 150
+    noise = np.random.default_rng(0).normal(0, 2, (2, *image.shape)).astype(np.float32)
+    points = np.array([[160.0, y] for y in range(40, 200, 20)])
+    upright = np.broadcast_to(np.eye(2), (len(points), 2, 2))
+    found = Appearance(cv2.GaussianBlur(image, (0, 0), 1.5) + noise[0], points, 7).align(
+        cv2.GaussianBlur(image, (0, 0), 1.5) + noise[1], points, upright, np.arange(len(points)), 2
+    )
+    assert np.all(found.covariance[:, 1, 1] > 5 * found.covariance[:, 0, 0])
+    np.testing.assert_allclose(found.sigma_px, np.sqrt(found.covariance[:, 1, 1]), rtol=0.1)
+
+
+def test_places_are_joined_by_how_sure_they_are() -> None:
+    where = Fusion(np.zeros((3, 2)))
+    across = np.broadcast_to(np.diag([1.0, 1e6]), (3, 2, 2))
+    along = np.broadcast_to(np.diag([1e6, 1.0]), (3, 2, 2))
+    where.add(np.full((3, 2), 4.0), across, np.array([True, True, False]))
+    where.add(np.full((3, 2), 2.0), along, np.array([True, False, False]))
+    np.testing.assert_allclose(where.points_px, [[4, 2], [4, 4], [0, 0]], atol=1e-5)

@@ -43,6 +43,26 @@ def test_follows_a_surface_that_turns_and_tilts() -> None:
     assert np.percentile(errors(seen, truth), 98) < 0.5
 
 
+def test_points_on_a_contour_do_not_slide_along_it() -> None:
+    rng = np.random.default_rng(3)
+    bare = IMAGE.copy()
+    bare[40:200, 115:165] = (90, 90, 90)
+    bare[40:200, 165:215] = (150, 150, 150)  # an edge, no texture beside it
+
+    def noisy(image: np.ndarray) -> np.ndarray:
+        return np.clip(image + rng.normal(0, 3, image.shape), 0, 255).astype(np.uint8)
+
+    on_edge = np.stack([np.full(8, 165.0), np.linspace(75, 165, 8)], axis=1)
+    points = np.concatenate([on_edge, POINTS[np.abs(POINTS[:, 0] - 165) > 60]])
+    tracker = PointTracker(noisy(bare), points)
+    for k in np.linspace(0.0, 1.0, 46)[1:]:
+        forward, backward = tilt(k)
+        seen = tracker.track(noisy(moved(bare, backward)))
+    off = np.linalg.norm(seen.points_px - forward(points), axis=1)[:8]
+    assert seen.visible.mean() > 0.9
+    assert np.sqrt(np.mean(off**2)) < 1.3, off
+
+
 def test_an_observation_is_nan_exactly_where_not_visible() -> None:
     tracker = PointTracker(IMAGE, POINTS)
     image, _ = scene(0.1)

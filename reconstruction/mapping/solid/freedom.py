@@ -9,10 +9,11 @@ from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import Camera
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.solid import Solid
-from reconstruction.settings import MORE_MODES, USUAL_MODES
+from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES
 
 COMPARED = 0.8  # of the points: no more modes can be compared
-BETTER = 0.97  # times what the usual modes leave over: less than that is worth the time
+BETTER = 0.97  # times what the usual modes leave over: less than that is worth the time of more,
+MUCH_BETTER = 0.75  # … and so many times less than those, the time of most: two to three times as much
 
 
 def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera) -> int:
@@ -28,15 +29,18 @@ def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera) -> int:
         camera: as it was made for.
     """
     p = W.shape[2]
-    more = min(MORE_MODES, int(COMPARED * p))
-    if more <= USUAL_MODES:
+    most = min(MOST_MODES, int(COMPARED * p))
+    if most <= USUAL_MODES:
         return USUAL_MODES
+    more = min(MORE_MODES, most)
     shape = solid.shape
-    modes = modal_basis(shape, triangulate((principal_axes(shape).T @ shape)[:2].T), more, "jensen-shannon").Upsilon
+    modes = modal_basis(shape, triangulate((principal_axes(shape).T @ shape)[:2].T), most, "jensen-shannon").Upsilon
     functions = np.concatenate([np.full((1, p), p**-0.5), modes])
     left = W - camera.center_px[:, None] - Bundle(solid.motion, 1 / solid.camera.focal_px).image()
-    usual, most = (left_over(left, visible, functions[: count + 1]) for count in (USUAL_MODES, more))
-    return MORE_MODES if most < BETTER * usual else USUAL_MODES
+    by = {count: left_over(left, visible, functions[: count + 1]) for count in (USUAL_MODES, more, most)}
+    if most > more and by[more] < BETTER * by[USUAL_MODES] and by[most] < MUCH_BETTER * by[more]:
+        return MOST_MODES
+    return MORE_MODES if by[more] < BETTER * by[USUAL_MODES] else USUAL_MODES
 
 
 def left_over(residuals: Array, visible: Mask, functions: Array) -> float:
