@@ -83,7 +83,7 @@ class Reconstruction:
         self._assumed = camera  # first frames may mislead: maps find the focal length by themselves
         self.map: Map | None = None
         self._given = given
-        self._mapper = (mapper or Mapper(settings)) if given is None else None
+        self._mapper: Mapper | None = mapper or Mapper(settings, given=given)
         self._mesh = mesh
         self.window: SlidingWindow | None = None
         self.bootstrap_frames = 0
@@ -227,7 +227,7 @@ class Reconstruction:
             if last is not None and not found.camera.perspective:
                 found = found.turned_like(last.shape)
         self.map, self.camera, rest = found, found.camera, found.rest
-        sheet = rest.flat or rest.kind == "isometric"
+        sheet = rest.flat or found.sheet is not None
         self.deformation = constraints.fitting(self.settings.deformation, flat=sheet)
         self.metric = distances.fitting(self.settings.metric, flat=sheet)
         modes = min(found.modes, rest.motion.shape.shape[1] - 1) if self.settings.modes == "auto" else self.settings.modes
@@ -235,7 +235,7 @@ class Reconstruction:
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
         keeps_lengths = self.deformation in ("bending", "inextensible")
-        refine = self.settings.refine_rest and keeps_lengths and not paper and rest.kind != "isometric"
+        refine = self.settings.refine_rest and keeps_lengths and not paper and found.sheet is None
         self.window = SlidingWindow(
             model,
             energy,

@@ -44,12 +44,13 @@ def estimator(config: Run, size: tuple[int, int], points_px: Array, start: Start
     focal = model.focal if isinstance(model.focal, float) else float(width)
     camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
     settings = settings_of(model, config.rest_shape, estimate_focal=not isinstance(model.focal, float))
-    if config.rest_shape in RECOVERED:
-        mapper = Mapper(settings, start, latency=LATENCY, frames=frames, live=config.live)
-        return Reconstruction(camera, settings, mapper=mapper)
-    from app.files.mesh_file import rest_of_surface  # trimesh takes its time to load
+    given = None
+    if config.rest_shape not in RECOVERED:
+        from app.files.mesh_file import rest_of_surface  # trimesh takes its time to load
 
-    return Reconstruction(camera, settings, rest_of_surface(Path(config.rest_shape), points_px, camera)[0])
+        given = rest_of_surface(Path(config.rest_shape), points_px, camera)[0]
+    mapper = Mapper(settings, start, latency=LATENCY, frames=frames, live=config.live, given=given)
+    return Reconstruction(camera, settings, given, mapper=mapper)
 
 
 def settings_of(model: Model, rest_shape: str, *, estimate_focal: bool) -> Settings:

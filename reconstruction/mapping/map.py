@@ -9,7 +9,7 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import triangulate, unique_edges
 from reconstruction.basis.model import Model
-from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
+from reconstruction.basis.rest_shape import Kind, RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import bundled, by_part, sheet, with_focal
 from reconstruction.mapping.isometric.focal import focal
@@ -43,7 +43,7 @@ class Map:
         unit_px: pixels of the first keyframe in a unit of the sheet.
         modes: how many it is worth.
         focal_note: how the focal length was found, in words; empty if it was not looked for.
-        evidence: what keyframes say for it, half against half; None of first frames and given shapes.
+        evidence: what keyframes say for it, half against half; None before there are enough of them.
     """
 
     rest: RestShape
@@ -111,6 +111,7 @@ def map_of(
     estimate_focal: bool,
     known: Array | None = None,
     start: Start = at_once,
+    given: RestShape | None = None,
 ) -> Map | None:
     """What keyframes W (K, 2, p) px with visibility (K, p) show, most different ones first; None where they do not tell.
 
@@ -121,8 +122,9 @@ def map_of(
         estimate_focal: whether the keyframes may change the focal length.
         known: the rest shape (3, p) so far, of any size.
         start: where a part of the work is done, meanwhile.
+        given: a rest shape from elsewhere, which stays. Keyframes of anything but a sheet in perspective add nothing to it.
     """
-    if len(W) < FEWEST_KEYFRAMES:
+    if len(W) < FEWEST_KEYFRAMES or (given is not None and not camera.perspective):
         return None
     try:
         seen_by = lens(camera, W)
@@ -130,10 +132,10 @@ def map_of(
         evidence = select(
             W, visible, camera, lambda parts: [through(by_part(whole(), part), W[part]) for part in parts], start
         )
-        if evidence.kind == "flat":
+        if evidence.kind == "flat" or (given is not None and evidence.kind != "sheet"):
             return None
         if evidence.kind == "sheet":
-            found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal)
+            found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal, given=given)
         else:
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
@@ -171,8 +173,16 @@ def solid_map(
     return Map(rest, found.camera, modes=modes_held(W, visible, found, camera), evidence=evidence)
 
 
-def sheet_map(W: Array, camera: Camera, found: IsometricSheet, evidence: Evidence, *, estimate_focal: bool) -> Map:
-    """The map of a sheet: its rest shape is the keyframe's shape that is nearest to all others."""
+def sheet_map(
+    W: Array,
+    camera: Camera,
+    found: IsometricSheet,
+    evidence: Evidence,
+    *,
+    estimate_focal: bool,
+    given: RestShape | None = None,
+) -> Map:
+    """The map of a sheet: its rest shape is the one given, else the keyframe's shape that is nearest to all others."""
     if estimate_focal and camera.perspective:
         search = focal(found)
         if search.known:
@@ -182,10 +192,12 @@ def sheet_map(W: Array, camera: Camera, found: IsometricSheet, evidence: Evidenc
     shapes = found.shapes()
     known = np.isfinite(shapes).all(axis=(0, 1))
     middle = medoid(shapes[:, :, known])
+    rest = completed(shapes[middle], shapes[middle])
+    rest = rest - rest.mean(axis=1, keepdims=True)
     unit_px = found.camera.focal_px / float(shapes[0, 2, known].mean())
-    whole = completed(shapes[middle], shapes[middle])
-    centre = whole.mean(axis=1, keepdims=True)
-    rest = whole - centre
+    if given is not None:
+        unit_px = ratio_of_sizes(given.motion.shape, rest)
+        rest = given.motion.shape / unit_px
     poses = [nearest_rotation((S - S.mean(axis=1, keepdims=True)) @ rest[:, known].T) for S in shapes[:, :, known]]
     origin = np.stack(
         [S[:, known].mean(axis=1) - R @ rest[:, known].mean(axis=1) for S, R in zip(shapes, poses, strict=True)]
@@ -193,8 +205,10 @@ def sheet_map(W: Array, camera: Camera, found: IsometricSheet, evidence: Evidenc
     s = found.camera.focal_px / (unit_px * origin[:, 2])
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, (s * unit_px)[:, None] * origin[:, :2])
     note = f"sheet from {len(shapes)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
+    kind: Kind = "isometric" if given is None else given.kind
     # Its shapes are smooth and go by lengths: there is no noise that more modes would fit, and fewer cut off its bends.
-    return Map(RestShape("isometric", motion, note), camera, found, unit_px, MORE_MODES, evidence=evidence)
+    note = note if given is None else f"{given.note}; {note}"
+    return Map(RestShape(kind, motion, note), camera, found, unit_px, MORE_MODES, evidence=evidence)
 
 
 def medoid(shapes: Array) -> int:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reconstruction.arrays import Array, Mask
+from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.mapping.bootstrap import bootstrap
 from reconstruction.mapping.keyframes import Keyframes, difference
@@ -40,6 +41,7 @@ class Mapper:
         latency: so many frames after it was begun a map is in force, so that shapes depend on no machine's speed; a first
             model sooner. With 0 nothing goes on meanwhile.
         live: whether frames do not wait for models: each is in force as soon as it is there.
+        given: a rest shape from elsewhere: no first model is looked for; maps keep it, and refine the lengths of a sheet.
 
     Attributes:
         start, latency: the same.
@@ -47,14 +49,24 @@ class Mapper:
     """
 
     def __init__(
-        self, settings: Settings, start: Start = at_once, *, latency: int = 0, frames: int | None = None, live: bool = False
+        self,
+        settings: Settings,
+        start: Start = at_once,
+        *,
+        latency: int = 0,
+        frames: int | None = None,
+        live: bool = False,
+        given: RestShape | None = None,
     ) -> None:
         self._settings, self.start, self.latency, self._live = settings, start, latency, live
         self._frames = np.inf if frames is None else frames
-        self._keyframes = Keyframes() if settings.maps else None
+        self._given = given
+        refined = settings.refine_rest and settings.deformation in ("auto", "inextensible")
+        self._keyframes = Keyframes() if settings.maps and (given is None or refined) else None
         self._frame = -1
-        self._first: list[tuple[Array, Mask]] | None = []  # frames, until they have given the first model
-        self.first_frames = 0
+        # Frames, until they have given the first model.
+        self._first: list[tuple[Array, Mask]] | None = [] if given is None else None
+        self.first_frames = 0 if given is None else 1
         self._looks = FIRST_LOOKS if settings.bootstrap_frames == "auto" else (settings.bootstrap_frames,)
         self._looked = 0  # at so many first frames
         self._first_job: Job | None = None
@@ -110,7 +122,8 @@ class Mapper:
             return None
         if self._found is None or self._map_job or self._version != self._keyframes.version:
             W, visible, _ = self._keyframes.spread()
-            self._found = map_of(W, visible, camera, self._settings.estimate_focal, self._known, self.start) or self._found
+            known = self._settings.estimate_focal, self._known, self.start, self._given
+            self._found = map_of(W, visible, camera, *known) or self._found
         return self._found and self._begin and nearest_first(self._found, *self._begin)
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
@@ -141,7 +154,7 @@ class Mapper:
             return
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
             self._version, self._extent = keyframes.version, keyframes.extent
-            arguments = *keyframes.spread()[:2], camera, self._settings.estimate_focal, self._known
+            arguments = *keyframes.spread()[:2], camera, self._settings.estimate_focal, self._known, at_once, self._given
             self._map_job = Job(self.start(map_of, *arguments), self._frame + self.latency)
 
     def _another(self, begin: tuple[Array, Mask]) -> Map | None:

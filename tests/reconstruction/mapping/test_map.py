@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from reconstruction.basis.model import build_model
+from reconstruction.basis.rest_shape import given
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map, completed, map_of, medoid, ratio_of_sizes
+from reconstruction.online import Reconstruction
+from reconstruction.settings import Settings
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
 
@@ -51,6 +54,24 @@ def test_units_do_not_matter(unit: float) -> None:
     again = map_of(W[::2] * unit, np.ones((FRAMES // 2, POINTS), bool), camera, estimate_focal=False)
     assert again is not None
     np.testing.assert_allclose(again.rest.motion.shape, found.rest.motion.shape * unit, rtol=1e-4, atol=1e-4 * unit)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_a_rest_shape_that_was_given_stays_and_all_frames_are_found(unit: float) -> None:
+    W, S, _ = waving()
+    shape = given(unit * S[0], "truth", "given")
+    reconstruction = Reconstruction(CAMERA, Settings(), shape)
+    every = np.ones(POINTS, bool)
+    before = [e for w in W for e in reconstruction.update(w, every)]
+    assert reconstruction.revise()
+    after = [e for w in W for e in reconstruction.update(w, every)]
+    assert reconstruction.rest is not None
+    np.testing.assert_allclose(reconstruction.rest.motion.shape, shape.motion.shape)
+    off, once = (float(e3d(np.stack([e.shape for e in made]), S).mean()) for made in (after, before))
+    assert off < min(0.04, 0.5 * once)
+    kept = Reconstruction(CAMERA, Settings(refine_rest=False), shape)
+    assert kept.update(W[0], every)
+    assert not kept.revise()
 
 
 def test_a_sheet_before_an_orthographic_camera() -> None:
