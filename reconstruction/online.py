@@ -94,6 +94,7 @@ class Reconstruction:
         self._last: ShapeEstimate | None = None
         self._restart = False
         self._foresight = Foresight(at_once)
+        self._usual = 0.0  # change of a sheet's lengths
 
     @property
     def phase(self) -> Phase:
@@ -210,7 +211,8 @@ class Reconstruction:
         expected, foreseen = None, self._foresight.next()
         if self.deformation == "inextensible":
             if foreseen is None or seen is not frame:
-                foreseen = self.map.foreseen([(seen.W, seen.visible)])[0]
+                foreseen = self.map.foreseen([(seen.W, seen.visible)], self._usual)[0]
+            self._usual = foreseen.usual if foreseen else self._usual
             expected = self.map.expected(self.window.model, foreseen, self.window.state)
         self._last = self.window.advance(seen.W, seen.visible, expected)
         if seen is frame:

@@ -13,7 +13,7 @@ from reconstruction.basis.rest_shape import Kind, RestShape, RigidMotion, rms_ra
 from reconstruction.camera import Camera, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import bundled, by_part, sheet, with_focal
 from reconstruction.mapping.isometric.focal import focal
-from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.isometric.sheet import Foreseen, IsometricSheet
 from reconstruction.mapping.selection import Evidence, select
 from reconstruction.mapping.solid.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
@@ -26,10 +26,6 @@ FEWEST_POINTS = 20
 LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
 RIGID = 0.005  # residual over the size, up to which a solid is rigid enough to hold a focal length
 BESIDE = 4  # known points that say where an unknown one is
-
-
-Foreseen = tuple[Array, Mask]
-"""A sheet's shape (3, p) in a frame, and which of its points (p,) are known."""
 
 
 @dataclass(frozen=True)
@@ -54,17 +50,18 @@ class Map:
     focal_note: str = ""
     evidence: Evidence | None = None
 
-    def foreseen(self, frames: list[tuple[Array, Mask]]) -> list[Foreseen | None]:
+    def foreseen(self, frames: list[tuple[Array, Mask]], usual: float = 0.0) -> list[Foreseen | None]:
         """What `expected` finds in frames by themselves, points (2, p) px, anything where not visible (p,).
 
-        None for a solid, or with too few points.
+        None for a solid, or with too few points. `usual` is the change of lengths in the frames before.
         """
-        if self.sheet is None:
-            return [None] * len(frames)
-        return [
-            self.sheet.shape_in(np.where(visible, W, 0.0), visible) if visible.sum() >= FEWEST_POINTS else None
-            for W, visible in frames
-        ]
+        found: list[Foreseen | None] = []
+        for W, visible in frames:
+            few = self.sheet is None or visible.sum() < FEWEST_POINTS
+            one = None if self.sheet is None or few else self.sheet.shape_in(np.where(visible, W, 0.0), visible, usual)
+            usual = usual if one is None else one.usual
+            found.append(one)
+        return found
 
     def expected(self, model: Model, foreseen: Foreseen | None, last: State | None) -> State | None:
         """Pose and Λ' of a sheet in another frame, by its lengths; None where nothing is foreseen.
@@ -76,13 +73,12 @@ class Map:
         """
         if self.sheet is None or foreseen is None:
             return None
-        found, known = foreseen
-        shape = self.unit_px * completed(found, self.rest.motion.shape)
+        shape = self.unit_px * completed(foreseen.shape, self.rest.motion.shape)
         if last is not None and not self.camera.perspective:
             depth, before = shape[2] - shape[2].mean(), (last.matrices()[-1] @ model.B)[2]
             if depth @ (before - before.mean()) < 0:
                 shape[2] -= 2 * depth
-        return model.state_of(shape, self.sheet.camera.focal_px, known, last)
+        return model.state_of(shape, self.sheet.camera.focal_px, foreseen.known, last)
 
     def state_of(self, model: Model, shape: Array) -> State | None:
         """Pose and Λ' of a shape (3, p) in camera axes, px, by the modes of a sheet; None for a solid."""

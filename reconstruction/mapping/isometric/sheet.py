@@ -16,7 +16,23 @@ from reconstruction.mapping.isometric.warps import ENOUGH, Warps, quick_fit
 
 STEPS = 2  # of depths: they are only the start
 HELD = 0.03  # of the image's RMS radius: how far a point that is not seen may be off where its neighbours put it
+RENEWED = 0.3  # weight of the newest frame in the usual change of lengths
 STUCK = 1.3  # times the usual frame's change of length: a frame that may be in another minimum
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """A sheet's shape in a frame, by its lengths.
+
+    Attributes:
+        shape: (3, p) in camera axes.
+        known: (p,) which of its points are known: seen, or held by those around them.
+        usual: change of lengths up to this frame, later ones counting more.
+    """
+
+    shape: Array
+    known: Mask
+    usual: float
 
 
 @dataclass(frozen=True)
@@ -67,22 +83,28 @@ class IsometricSheet:
         """(F, 3, p) in camera axes as `shapes`, with the points where the keyframes W (F, 2, p) px saw them."""
         return np.exp(self.log_depths)[:, None] * rays_of(W, self.camera)
 
-    def shape_in(self, W: Array, visible: Mask) -> tuple[Array, Mask]:
+    def shape_in(self, W: Array, visible: Mask, usual: float = 0.0) -> Foreseen:
         """The shape in one more frame W (2, p) px, visible (p,), its lengths known.
 
         It starts from the two keyframes that look most alike, and where both do badly from the deepest shape.
 
-        Returns:
-            (3, p) in camera axes, and which of its points (p,) are known: seen, or held by those around them.
+        Args:
+            W: as above.
+            visible: as above.
+            usual: change of lengths in the frames before, which is not bad, if that in keyframes is less.
         """
         points = self.nodes.points
         image, variance, weights = quick_fit(self.warps, W, visible, points)
-        c = self._depths(replace(self.nodes, images=image[None, :, points], variance=variance[None]))
+        c, strain = self._depths(replace(self.nodes, images=image[None, :, points], variance=variance[None]), usual)
         held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
         known = visible | held[self.nodes.nearest(self.warps.reference)]
         start = np.exp(c @ self.values.T) * rays_of(image[None], self.camera)[0]
         C = self.bundled(start[None], W[None], weights[None])[0]
-        return np.asarray(np.where(self.warps.placed, C @ self.functions.T, np.nan)), known
+        return Foreseen(
+            np.where(self.warps.placed, C @ self.functions.T, np.nan),
+            known,
+            (1 - RENEWED) * usual + RENEWED * float(strain[0]),
+        )
 
     @property
     def functions(self) -> Array:
@@ -124,15 +146,17 @@ class IsometricSheet:
         nodes = replace(self.nodes, images=warps.images(self.nodes.points))
         return replace(self, warps=warps, nodes=nodes, coefficients=np.log(shapes[:, 2, few]) @ to_depths.T)
 
-    def _depths(self, nodes: Nodes) -> Array:
-        """Coefficients (F, r) of log depths with which nodes keep their lengths in their images."""
+    def _depths(self, nodes: Nodes, usual: float) -> tuple[Array, Array]:
+        """Coefficients (F, r) of log depths with which nodes keep their lengths in their images, and how well (F,)."""
         edges = edges_between(nodes, self.values, self.camera).weighted(self.edge_weights)
         alike = nearest(nodes.images, self.nodes.images)[:, :2]
         starts = list(self.coefficients[alike].swapaxes(0, 1))
         c = best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, STEPS)
-        stuck = np.flatnonzero(edges.rms(edges.log_lengths(c) - self.log_lengths) > STUCK * np.median(self.strain))
+        strain = edges.rms(edges.log_lengths(c) - self.log_lengths)
+        stuck = np.flatnonzero(strain > STUCK * max(float(np.median(self.strain)), usual))
         if len(stuck):
             some, held, B = nodes.in_frames(stuck), edges.frames(stuck), self.values[nodes.points]
             deepest = convex_finish(some, held, self.nodes, self.coefficients, B, self.field.stiffness, self.camera)
             c[stuck] = best_start(held, self.log_lengths, [c[stuck], deepest], self.field.stiffness, self.bend, STEPS)
-        return c
+            strain[stuck] = held.rms(held.log_lengths(c[stuck]) - self.log_lengths)
+        return c, strain
