@@ -64,8 +64,7 @@ class Reconstruction:
         camera: with the focal length in force.
         window: the sliding window, once there is a model.
         bootstrap_frames: frames that gave the first model.
-        metric: the dissimilarity in force; None until the rest shape decides.
-        deformation: the constraint in force; auto until the rest shape decides.
+        metric, deformation: dissimilarity and constraint in force; None and auto until the rest shape decides.
         revisions: how often another model replaced the one before, on the way.
     """
 

@@ -108,6 +108,7 @@ def map_of(
     known: Array | None = None,
     start: Start = at_once,
     given: RestShape | None = None,
+    last: bool = False,
 ) -> Map | None:
     """What keyframes W (K, 2, p) px with visibility (K, p) show, most different ones first; None where they do not tell.
 
@@ -119,6 +120,7 @@ def map_of(
         known: the rest shape (3, p) so far, of any size.
         start: where a part of the work is done, meanwhile.
         given: a rest shape from elsewhere, which stays. Keyframes of anything but a sheet in perspective add nothing to it.
+        last: whether there will be no other, so that time may be spent on it.
     """
     if len(W) < FEWEST_KEYFRAMES or (given is not None and not camera.perspective):
         return None
@@ -131,7 +133,7 @@ def map_of(
         if evidence.kind == "flat" or (given is not None and evidence.kind != "sheet"):
             return None
         if evidence.kind == "sheet":
-            found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal, given=given)
+            found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=last)
         else:
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
@@ -177,6 +179,7 @@ def sheet_map(
     *,
     estimate_focal: bool,
     given: RestShape | None = None,
+    last: bool,
 ) -> Map:
     """The map of a sheet: its rest shape is the one given, else the keyframe's shape that is nearest to all others."""
     if estimate_focal and camera.perspective:
@@ -184,7 +187,7 @@ def sheet_map(
         if search.known:
             found = with_focal(found, search.focal_px)
             camera = found.camera
-    found = bundled(found, W)
+    found = bundled(found, W) if last else found
     shapes = found.shapes()
     known = np.isfinite(shapes).all(axis=(0, 1))
     middle = medoid(shapes[:, :, known])

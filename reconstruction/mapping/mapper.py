@@ -120,11 +120,10 @@ class Mapper:
         """The map of the keyframes of all frames, posed first as in the first frame; None if they do not tell."""
         if self._keyframes is None:
             return None
-        if self._found is None or self._map_job or self._version != self._keyframes.version:
-            W, visible, _ = self._keyframes.spread()
-            known = self._settings.estimate_focal, self._known, self.start, self._given
-            self._found = map_of(W, visible, camera, *known) or self._found
-        return self._found and self._begin and nearest_first(self._found, *self._begin)
+        W, visible, _ = self._keyframes.spread()
+        known = self._settings.estimate_focal, self._known, self.start, self._given
+        found = map_of(W, visible, camera, *known, last=True) or self._found
+        return found and self._begin and nearest_first(found, *self._begin)
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
         """Begin a first model, if it is time."""

@@ -29,7 +29,7 @@ def model(poses: int) -> Map:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Models that say how many frames they are of."""
     monkeypatch.setattr(mapper, "bootstrap", lambda W, *others: model(len(W)) if others[-1] else None)
-    monkeypatch.setattr(mapper, "map_of", lambda W, *_: model(len(W)))
+    monkeypatch.setattr(mapper, "map_of", lambda W, *_, **__: model(len(W)))
 
 
 class Later:
