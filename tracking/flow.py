@@ -18,7 +18,6 @@ GUIDES = 150
 GUIDE_WINDOWS_PX = (11, 31)  # of the half picture; the second for those that do not come back with the first
 GUIDE_LEVELS = 3  # halvings of a half picture 320 px wide
 NEAREST_GUIDES = 8  # guides whose median motion a point starts from
-LOST_GUIDES = 0.1  # of the guides: fewer that do not come back are missed by nobody
 FEW_GUIDES = 0.7  # of the guides: come fewer back, the light may have changed
 LIGHT = 0.15  # the usual change of brightness at a guide, as a share: noise makes up to 0.1 of it, more is light
 EVENED_PX = 31  # side of the squares over which light is evened out: smaller than bands of light, larger than a window
@@ -114,7 +113,7 @@ class Flow:
         for window in GUIDE_WINDOWS_PX:
             left = np.flatnonzero(~good)
             still = np.zeros((len(left), 2))
-            if len(left) > LOST_GUIDES * len(start):
+            if len(left):
                 moved[left], found = lucas_kanade(before.half, now.half, start[left], still, window, levels, CONVERGED_PX)
                 good[left] = found & returned(before.half, now.half, start[left], moved[left], still, window, levels)
         light = change_of_light(before.half, now.half, start[good], moved[good])
