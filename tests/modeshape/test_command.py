@@ -45,7 +45,7 @@ def test_run_retexture_and_batch_beside_foreign_modules(folder: Path, video: Pat
 def test_benchmarks_beside_foreign_modules(folder: Path, video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.delenv("PYTHONPATH", raising=False)
-    assert run_apart(video, (0, 0, 320, 240), 60, 10)["points"] > 0
+    assert run_apart(video, None, (0, 0, 320, 240), 60, 10)["points"] > 0
 
 
 def test_python_path_with_the_current_folder(folder: Path, video: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -17,6 +17,7 @@ from reconstruction.mapping.isometric.warps import ENOUGH, Warps, quick_fit
 STEPS = 2  # of depths: they are only the start
 HELD = 0.03  # of the image's RMS radius: how far a point that is not seen may be off where its neighbours put it
 RENEWED = 0.3  # weight of the newest frame in the usual change of lengths
+FARTHEST = 1.5  # times as deep as before, or less deep: a step that goes further has lost its way, and is not taken
 STUCK = 1.3  # times the usual frame's change of length: a frame that may be in another minimum
 
 
@@ -129,7 +130,11 @@ class IsometricSheet:
         C = shapes[:, :, few] @ self.projector
         rows = few if (weights[:, few] > 0).mean() > ENOUGH else np.arange(len(B))
         rays = rays_of(W[:, :, rows], self.camera)[:, :2]
-        return stepped(C, data_normal(rays, weights[:, rows] * self.camera.focal_px**2, C, B[rows]), self.lengths)
+        normal = data_normal(rays, weights[:, rows] * self.camera.focal_px**2, C, B[rows])
+        step = stepped(C, normal, self.lengths)
+        depth = (step[:, 2] @ B[few].T) / shapes[:, 2, few]
+        good = (np.abs(np.log(np.maximum(depth, 1e-9))) < np.log(FARTHEST)).all(axis=1)  # of NaN, too, it is not
+        return np.asarray(np.where(good[:, None, None], step, C))
 
     def moved(self, places: Array) -> "IsometricSheet":
         """The same with points at other places (2, p) of the reference image."""

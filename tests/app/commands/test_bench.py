@@ -27,7 +27,7 @@ def test_what_is_measured_can_be_printed(capsys: pytest.CaptureFixture[str]) -> 
     from app.commands.bench import Benchmarks
 
     run = WholeRun(
-        "demo", 800, 100, 2.0, 3.0, 3.5, 2.5, 4.0, 10.0, 12.0, {"median": 20.0}, {"track": 5.0}, 7.0, 300.0, 400.0, 0.5
+        "demo", 800, 100, 2.0, 3.0, 3.5, 2.5, 4.0, 10.0, 12.0, {"median": 20.0}, {"track": 5.0}, 7.0, 300.0, 400.0, 0.3, 0.5
     )
     measured = Benchmarks(
         machine={},
