@@ -37,4 +37,4 @@ def test_an_occluder_costs_little(made: Sample, clean: Result, tmp_path: Path, w
     after = range(OCCLUDED.stop, 300)
     assert result.visible[OCCLUDED.stop + 10].mean() >= 0.9
     assert result.error(OCCLUDED) <= most
-    assert result.error(after) <= 1.1 * clean.error(after)
+    assert result.error(after) <= 1.3 * clean.error(after)
