@@ -132,7 +132,7 @@ class Reconstruction:
 
     def predict(self, ahead: int = 1) -> Array | None:
         """Where so many frames on the points will be, (p, 2) px at constant velocity; None while frames wait for shapes."""
-        return None if self.window is None or self._waiting else self.window.predict(ahead)
+        return None if self.window is None or self.behind else self.window.predict(ahead)
 
     def update(self, W: Array, visible: Mask) -> list[ShapeEstimate]:
         """Take one frame's points (2, p) px with visibility (p,); returns the shapes now known, oldest first.

@@ -125,8 +125,14 @@ def few_bits(source: str) -> float | None:
     if not Path(source).is_file():
         return None
     capture = cv2.VideoCapture(source)
-    bits = bits_per_px(cast(Capture, capture)) if capture.isOpened() else None
+    bits = few_bits_of(cast(Capture, capture)) if capture.isOpened() else None
     capture.release()
+    return bits
+
+
+def few_bits_of(capture: Capture) -> float | None:
+    """The same of an open video."""
+    bits = bits_per_px(capture)
     return bits if bits is not None and bits < FEW_BITS else None
 
 
@@ -170,7 +176,7 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
     file = cv2.VideoCapture(source)
     if not file.isOpened():
         raise TrackingError(f"{source} cannot be decoded; it is not a video, or it is damaged or cut off")
-    if (bits := few_bits(source)) is not None:
+    if (bits := few_bits_of(cast(Capture, file))) is not None:
         log(f"{source} is compressed to {bits:.2g} bits a pixel: little texture is left to follow; export it with more")
     return squared(cast(Capture, file), source, log)
 

@@ -136,7 +136,9 @@ def evaluate_many() -> int:
     return MANY_POINTS
 
 
-def run_apart(video: Path, truth: Path, roi: tuple[int, int, int, int], points: int, frames: int | None) -> dict[str, Any]:
+def run_apart(
+    video: Path, truth: Path | None, roi: tuple[int, int, int, int], points: int, frames: int | None
+) -> dict[str, Any]:
     """`modeshape run` in a process that notes when each frame is done."""
     with TemporaryDirectory(prefix="modeshape-") as folder:
         where = ["--roi", *map(str, roi), "--points", str(points), "--frames", f":{frames or ''}"]
