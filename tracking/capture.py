@@ -172,7 +172,6 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
         raise TrackingError(f"no video file {source}; check the path")
     if not os.access(path, os.R_OK):
         raise TrackingError(f"{source} cannot be read: permission denied")
-    check_progressive(source)
     file = cv2.VideoCapture(source)
     if not file.isOpened():
         raise TrackingError(f"{source} cannot be decoded; it is not a video, or it is damaged or cut off")
@@ -182,30 +181,25 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
 
 
 def times_rise(source: str) -> bool:
-    """Whether the first frames of a file have times that rise: of some OpenCV tells them in the decoder's order."""
-    capture = cv2.VideoCapture(source)
-    times: list[float] = []
-    while len(times) < PROBED and capture.grab():
-        times.append(capture.get(cv2.CAP_PROP_POS_MSEC))
-    capture.release()
-    return bool((np.diff(times) > 0).all())
-
-
-def check_progressive(source: str) -> None:
-    """Check that OpenCV makes pictures of a file: of interlaced frames some give the same memory again and again.
+    """Whether the first frames of a file have times that rise: of some OpenCV tells them in the decoder's order.
 
     Raises:
-        TrackingError: it does not.
+        TrackingError: OpenCV makes no pictures of its interlaced frames: of some the same memory again and again.
     """
     capture = cv2.VideoCapture(source)
-    first, second = (capture.read()[1] for _ in range(2))
+    times: list[float] = []
+    pictures: list[Image] = []
+    while len(times) < PROBED and capture.grab():
+        times.append(capture.get(cv2.CAP_PROP_POS_MSEC))
+        if len(pictures) < 2:
+            pictures.append(cast(Image, capture.retrieve()[1]))
     capture.release()
-    if first is None or second is None or not np.array_equal(first, second) or not interlaced(source):
-        return
-    raise TrackingError(
-        f"{source} is interlaced video, which OpenCV {cv2.__version__} does not decode; convert it: "
-        f"ffmpeg -i {shlex.quote(source)} -vf bwdif -c:v libx264 -crf 18 converted.mp4"
-    )
+    if len(pictures) == 2 and np.array_equal(pictures[0], pictures[1]) and interlaced(source):
+        raise TrackingError(
+            f"{source} is interlaced video, which OpenCV {cv2.__version__} does not decode; convert it: "
+            f"ffmpeg -i {shlex.quote(source)} -vf bwdif -c:v libx264 -crf 18 converted.mp4"
+        )
+    return bool((np.diff(times) > 0).all())
 
 
 def interlaced(source: str) -> bool:

@@ -26,6 +26,7 @@ from app.options.reproduce import Reproduce
 from app.options.retexture import Retexture
 from app.options.review import Review
 from app.options.run import Demo, Run
+from app.processes.child import keep_memory
 from app.terminal.arguments import meant, spelled_out
 from app.terminal.errors import UsageError, in_a_line
 from app.terminal.exit_code import ExitCode
@@ -58,6 +59,7 @@ Start with `modeshape demo`, then `modeshape run your_video.mp4`, or
 def main() -> NoReturn:
     """Entry point of the `modeshape` script; see `ExitCode` for how it ends."""
     os.environ.update(environment())
+    keep_memory()
     prepare()
     try:
         with warnings.catch_warnings():
@@ -98,15 +100,17 @@ def parse(arguments: list[str]) -> Any:
 
         show(page(name, kinds[name]) if name else overview(DESCRIPTION, kinds))
     everything = ["--help" if one == "--help-all" else one for one in spelled_out(arguments)]
-    commands: Any = reduce(or_, [Annotated[kind, tyro.conf.subcommand(one)] for one, kind in kinds.items()])
+    commands: Any = kinds.get(name)  # by itself: a parser of all takes its time to build
+    if not name:
+        commands = reduce(or_, [Annotated[kind, tyro.conf.subcommand(one)] for one, kind in kinds.items()])
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint), standard_output():
             return tyro.cli(
                 commands,
-                prog="modeshape",
-                args=everything,
-                description=DESCRIPTION,
+                prog=f"modeshape {name}".rstrip(),
+                args=everything[1:] if name else everything,
+                description=None if name else DESCRIPTION,
                 config=(tyro.conf.AvoidSubcommands,),
             )
     except SystemExit as stop:

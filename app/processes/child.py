@@ -3,11 +3,17 @@
 import os
 import subprocess
 import sys
+from contextlib import suppress
+from ctypes import CDLL
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from tempfile import TemporaryFile
 
 from app.environment import environment
+
+NICE = 5  # of processes that frames do not wait for
+KEPT_BYTES = 32 * 2**20
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 
 
 def child(module: str, *files: int) -> tuple["subprocess.Popen[bytes]", Connection]:
@@ -36,8 +42,18 @@ def started(module: str, *files: int) -> "subprocess.Popen[bytes]":
     )
 
 
-def connection_to_parent() -> Connection:
-    """The connection of a process that `child` began."""
+def keep_memory() -> None:
+    """Keep the memory of pictures and arrays for the next ones: to get it cleared by the system takes time."""
+    with suppress(OSError, AttributeError):  # another C library
+        mallopt = CDLL(None).mallopt
+        for parameter in (M_TRIM_THRESHOLD, M_MMAP_THRESHOLD):
+            mallopt(parameter, KEPT_BYTES)
+
+
+def connection_to_parent(*, nice: int = 0) -> Connection:
+    """The connection of a process that `child` began; the process keeps its memory, and is so nice, from now on."""
+    keep_memory()
+    os.nice(nice)
     return Connection(inherited_file(1))
 
 

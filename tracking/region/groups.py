@@ -109,15 +109,16 @@ def local_slope(place: Array, moved: Array) -> Array:
     gain = moved[:, beside] - moved[:, :, None]  # (F, P, k, 2)
     known = np.isfinite(gain[..., 0])
     gain = np.where(known[..., None], gain, 0.0)
+    products = (apart[..., :, None] * apart[..., None, :]).reshape(*beside.shape, 4)
     pull = STIFFNESS * (apart**2).sum(axis=(1, 2))[:, None, None] * np.eye(2)
     slope = np.zeros((*moved.shape, 2))
     for _ in range(ROUNDS):
-        left = gain - np.einsum("fpcd,pkd->fpkc", slope, apart)
+        left = gain - apart @ slope.swapaxes(2, 3)
         off = np.sqrt((left**2).sum(axis=(0, 3)) / known.sum(axis=0).clip(1))  # (P, k)
         usual = np.median(off, axis=1, keepdims=True) + NOISE_PX
         w = known / (1.0 + (2.0 * off / usual) ** 2) ** 2
-        gram = np.einsum("fpk,pkc,pkd->fpcd", w, apart, apart) + pull
-        slope = np.einsum("fpk,fpkc,pkd->fpcd", w, gain, apart) @ np.linalg.inv(gram)
+        gram = (w[..., None, :] @ products).reshape(slope.shape) + pull
+        slope = (w[..., None] * gain).swapaxes(2, 3) @ apart @ np.linalg.inv(gram)
     return np.asarray(slope)
 
 

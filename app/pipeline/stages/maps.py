@@ -1,15 +1,12 @@
 """The stage that makes models, while frames go on."""
 
-import os
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, Self
 
-from app.processes.child import connection_to_parent
+from app.processes.child import NICE, connection_to_parent
 from app.processes.remote import Remote, serve
-
-NICE = 5  # frames go first
 
 
 class MapProcess:
@@ -37,8 +34,7 @@ class MapProcess:
 
 def main() -> None:
     """What the other process does, until nobody listens any more."""
-    connection = connection_to_parent()
-    os.nice(NICE)
+    connection = connection_to_parent(nice=NICE)
     import reconstruction.mapping.mapper  # noqa: F401 (takes its time: before the first call)
 
     serve(connection, lambda message: message[0](*message[1]))
