@@ -127,13 +127,13 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
         g = gradient(edges, c, stiffness, solver)
         g[:, 0] -= g[:, 0].mean()  # not along the scale, which is held
         diagonal = np.einsum("frr->fr", blocks) - (K**2).sum(axis=1)
-        right = np.concatenate([g[:, :, None], K.transpose(0, 2, 1)], axis=2)
         while damping < HOPELESS:
             D = blocks + (damping * diagonal + 1e-9)[:, :, None] * np.eye(r)
-            solved = np.linalg.solve(D, right)
-            through = np.tensordot(K, solved, axes=([0, 2], [0, 1]))
-            shared = scipy.linalg.solve(np.eye(n) - through[:, 1:], through[:, 0], assume_a="sym", check_finite=False)
-            new = c - solved[:, :, 0] - solved[:, :, 1:] @ shared
+            root_of_inverse = np.linalg.inv(np.linalg.cholesky(D)).transpose(0, 2, 1)
+            Z, y = K @ root_of_inverse, g[:, None] @ root_of_inverse  # (F, n, r), (F, 1, r)
+            through = Z.transpose(1, 0, 2).reshape(n, F * r)
+            shared = scipy.linalg.solve(np.eye(n) - through @ through.T, through @ y.ravel(), assume_a="sym", check_finite=False)
+            new = c - (root_of_inverse @ (y[:, 0] + shared @ Z)[:, :, None])[:, :, 0]
             new[:, 0] -= new[:, 0].mean()
             after = cost(edges, new, stiffness, solver)
             if after < before:
