@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -21,7 +22,7 @@ WINDOW_PX = 15
 WIDE_PX = 31  # leads points that do not come back: fast ones. It sees across borders, so the other has the last word
 FEWEST, POINTS = 50, 800
 LEFT_OUT = 0.03  # of the points: when no more are of something else, a region stays as it was given
-BLANK_FRAMES = 300  # without texture at the beginning, and no more are waited for
+MOST_WAITED = 300  # frames, and what there is by then is taken: no more are waited for texture, or between cuts
 
 
 @dataclass(frozen=True)
@@ -137,6 +138,11 @@ def followed(before: Grays, now: Grays, points_px: Array) -> tuple[Array, Flags]
     return there, good
 
 
+def farther(one: tuple[Search, Frame] | None, other: tuple[Search, Frame] | None) -> tuple[Search, Frame] | None:
+    """The one that has moved more, the former if neither has."""
+    return max(filter(None, (one, other)), key=lambda looked: looked[0].moved_px, default=None)
+
+
 def search(frames: Iterable[Frame], region: Image) -> Found:
     """Look for the surface in a region (H, W) uint8 of the first frames.
 
@@ -146,9 +152,9 @@ def search(frames: Iterable[Frame], region: Image) -> Found:
         TrackingError: no frame has enough corners.
     """
     begun: tuple[Search, Frame] | None = None
-    earlier = begun  # what there was before a cut, if nothing comes after it
+    earlier = begun  # of what was cut away what had moved most, if nothing better comes after it
     blank = TrackingError("there is no frame")
-    for waited, frame in enumerate(frames):
+    for frame in islice(frames, MOST_WAITED):
         if begun is not None:
             same = begun[0].add(frame.image)
             if same and not begun[0].faint:
@@ -157,14 +163,13 @@ def search(frames: Iterable[Frame], region: Image) -> Found:
                 continue
             if not same and begun[0].moved_px > 0.5 * FAR_ENOUGH * max(region.shape):
                 break
-            earlier, begun = begun, None
+            earlier, begun = farther(earlier, begun), None
         try:
             begun = Search(frame.image, region), frame
         except TrackingError as error:
             blank = error
-            if waited >= BLANK_FRAMES:
-                break
-    begun = begun or earlier
+    else:  # nothing was enough
+        begun = farther(earlier, begun)
     if begun is None:
         raise blank
     looked, first = begun

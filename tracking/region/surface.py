@@ -127,6 +127,7 @@ def surface_mask(place: Array, own: Flags, others: Flags, region: Image) -> Imag
     near = nearer * (to_own < REACH * spacing)
     whole = cv2.morphologyEx(near, cv2.MORPH_CLOSE, disc(GAP * spacing)) * nearer
     smooth = cv2.morphologyEx(whole, cv2.MORPH_OPEN, disc(REACH * spacing))
+    smooth = smooth if smooth.any() else near  # points too far apart for anything smooth
     contours, levels = cv2.findContours(smooth, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     mask = np.zeros(region.shape[:2], np.uint8)
     cv2.drawContours(

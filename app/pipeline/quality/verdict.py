@@ -29,6 +29,7 @@ FAIR_SHARE, POOR_SHARE = 0.5, 0.3
 # half times that and more where they really change (a balloon, a crease), and then no rest shape is right.
 FAIR_STRAIN = 1.5
 LITTLE_STRAIN = 0.005  # of lengths: lenses and tracks leave as much over with good shapes
+TOSS_UP = 1.1  # sureness, up to which another kind of thing may be as true
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
@@ -176,6 +177,9 @@ def evidence(course: Course, found: Map, *, known: bool) -> Iterator[Verdict]:
                 "only the first frames say what it is, depth may be a guess; film it turning or bending more, from near by",
             )
         return
+    if found.evidence.sureness < TOSS_UP:
+        told = "another kind of thing would leave about as much over, so depth may be a guess"
+        yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
     usual = float(np.nanmedian(np.asarray(course.errors)))
     if found.sheet is not None and found.sheet.strain_rms > max(FAIR_STRAIN * usual, LITTLE_STRAIN):
         told = f"its lengths change by {found.sheet.strain_rms:.1%}, more than noise explains: it stretches, or has creases"

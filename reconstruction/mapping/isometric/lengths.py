@@ -132,7 +132,9 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
             root_of_inverse = np.linalg.inv(np.linalg.cholesky(D)).transpose(0, 2, 1)
             Z, y = K @ root_of_inverse, g[:, None] @ root_of_inverse  # (F, n, r), (F, 1, r)
             through = Z.transpose(1, 0, 2).reshape(n, F * r)
-            shared = scipy.linalg.solve(np.eye(n) - through @ through.T, through @ y.ravel(), assume_a="sym", check_finite=False)
+            shared = scipy.linalg.solve(
+                np.eye(n) - through @ through.T, through @ y.ravel(), assume_a="sym", check_finite=False
+            )
             new = c - (root_of_inverse @ (y[:, 0] + shared @ Z)[:, :, None])[:, :, 0]
             new[:, 0] -= new[:, 0].mean()
             after = cost(edges, new, stiffness, solver)

@@ -52,6 +52,12 @@ def test_nothing_known_but_the_first_frames() -> None:
     assert "film it" in said.reason
 
 
+def test_what_may_as_well_be_something_else() -> None:
+    said = verdict(course([0.001] * 50), replace(SOLID, evidence=replace(EVIDENCE, sureness=1.02)))
+    assert said.grade == "fair"
+    assert "depth may be a guess" in said.reason
+
+
 @pytest.mark.parametrize(("share", "grade"), [(0.9, "good"), (0.4, "fair"), (0.2, "poor")])
 def test_what_is_not_seen_is_a_guess(share: float, grade: str) -> None:
     assert verdict(course([0.003] * 50, share), SOLID).grade == grade

@@ -7,6 +7,7 @@ import pytest
 
 from tracking import TrackingError
 from tracking.region.mask import outline, region_mask
+from tracking.region.surface import surface_mask
 
 SIZE = (64, 48)
 
@@ -77,3 +78,11 @@ def test_the_outline_of_a_rectangle_is_closed_and_on_its_border() -> None:
 
 def test_the_whole_picture_has_no_outline() -> None:
     assert outline(region_mask(SIZE)) == []
+
+
+def test_points_among_others_have_a_surface_however_scattered() -> None:
+    region = np.full((240, 320), 255, np.uint8)
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        place, own = rng.uniform(0, [319, 239], (200, 2)), np.arange(200) < rng.integers(4, 20)
+        assert surface_mask(place, own, ~own, region).any()

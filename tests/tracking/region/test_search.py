@@ -1,6 +1,7 @@
 """The surface found in small videos that are composed, and in real ones."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from tests.tracking.scene import texture
 from tracking import TrackingError
 from tracking.features import detect_corners
-from tracking.region.search import MOST_FRAMES, Found, search
+from tracking.region.search import MOST_FRAMES, MOST_WAITED, Found, search
 from tracking.video import Frame, Video
 
 Image = NDArray[np.uint8]
@@ -110,6 +111,19 @@ def test_what_comes_before_a_cut_is_taken_if_it_moves() -> None:
     found = search([*scene((90, 60, 130, 110, 12.0)), *after], WHOLE)
     assert found.first.index == 0
     assert overlap(found, 90, 60, 130, 110) > 0.7
+
+
+def test_of_nothing_but_cuts_the_picture_with_most_motion_is_taken() -> None:
+    swinging = list(scene((90, 60, 130, 110, 25.0), frames=6))
+    cuts = [Frame(k, k / 30, texture(30 + k)) for k in range(4)]
+    frames = [replace(frame, index=k) for k, frame in enumerate([*cuts[:2], *swinging, *cuts[2:]])]
+    assert search(frames, WHOLE).first.index == 2
+
+
+def test_endless_cuts_are_not_waited_for() -> None:
+    taken = []
+    search((taken.append(k) or Frame(k, k / 30, texture(k % 50)) for k in range(2 * MOST_WAITED)), WHOLE)  # type: ignore[func-returns-value]
+    assert len(taken) == MOST_WAITED
 
 
 def test_of_a_drawn_region_what_is_in_its_middle_is_taken() -> None:
