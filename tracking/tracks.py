@@ -60,7 +60,9 @@ class Tracks:
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """Read an .npz file: `W` and optionally `visible` (absent: all), `K`, `S_gt`, `gt_frames`; pixels become square.
+        """Read an .npz file: `W` and optionally `visible` (absent: what is finite), `K`, `S_gt`, `gt_frames` (absent: all).
+
+        Pixels become square.
 
         Raises:
             TrackingError: the file is missing, is no .npz, lacks `W`, or its arrays do not fit.
@@ -75,9 +77,12 @@ class Tracks:
             W = _numbers("W", arrays)
             visible = _flags("visible", arrays)
             if visible is None:
-                visible = np.ones((W.shape[0], W.shape[-1]) if W.ndim == 3 else (0, 0), bool)
+                visible = np.asarray(np.isfinite(W).all(axis=1) if W.ndim == 3 else np.zeros((0, 0), bool))
             given = {name: _numbers(name, arrays) for name in ("K", "S_gt") if name in arrays}
-            tracks = cls(W, visible, given.get("K"), given.get("S_gt"), _frame_numbers(arrays))
+            gt_frames = _frame_numbers(arrays)
+            if gt_frames is None and len(given.get("S_gt", [])) == len(W):
+                gt_frames = np.arange(len(W))
+            tracks = cls(W, visible, given.get("K"), given.get("S_gt"), gt_frames)
             check_extent(tracks.W, tracks.visible)
             return tracks.with_square_pixels()
         except TrackingError as error:

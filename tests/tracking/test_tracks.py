@@ -43,9 +43,16 @@ def test_only_w_is_needed(tmp_path: Path) -> None:
     assert tracks.K is tracks.S_gt is tracks.gt_frames is None
 
 
-def test_hidden_entries_may_be_nan(tmp_path: Path) -> None:
-    visible = np.isfinite(NAN_W[:, 0])
-    assert Tracks.load(write(tmp_path, W=NAN_W, visible=visible.astype(np.uint8))).visible.sum() == F * (P - 1)
+@pytest.mark.parametrize("told", [True, False])
+def test_hidden_entries_may_be_nan(tmp_path: Path, *, told: bool) -> None:
+    visible = {"visible": np.isfinite(NAN_W[:, 0]).astype(np.uint8)} if told else {}
+    assert Tracks.load(write(tmp_path, W=NAN_W, **visible)).visible.sum() == F * (P - 1)
+
+
+def test_true_shapes_of_all_frames_need_no_numbers(tmp_path: Path) -> None:
+    tracks = Tracks.load(write(tmp_path, W=W, S_gt=np.repeat(S[:1], F, axis=0)))
+    assert tracks.gt_frames is not None
+    assert tracks.gt_frames.tolist() == list(range(F))
 
 
 @pytest.mark.parametrize(
@@ -57,7 +64,6 @@ def test_hidden_entries_may_be_nan(tmp_path: Path) -> None:
         ({"W": np.moveaxis(W, 1, 2)}, "W has the shape (5, 7, 2), but (frames, 2, points) is needed"),
         ({"W": W[:0]}, "W has the shape (0, 2, 7), but"),
         ({"W": NAN_W}, "W has 5 visible entries that are not finite (first: frame 0, point 3)"),
-        ({"W": NAN_W, "visible": None}, "W has 5 visible entries that are not finite"),
         ({"W": W.astype(str)}, "W holds <U32, but numbers are needed"),
         ({"W": W * 1j}, "W holds complex128, but numbers are needed"),
         ({"visible": np.ones((P, F), bool)}, "visible has the shape (7, 5), but (5, 7) as in W is needed"),

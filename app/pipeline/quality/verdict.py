@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 
 from app.arrays import Flags
+from reconstruction.basis.rest_shape import rms_radius
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.map import Map
 
@@ -29,7 +30,8 @@ FAIR_SHARE, POOR_SHARE = 0.5, 0.3
 # half times that and more where they really change (a balloon, a crease), and then no rest shape is right.
 FAIR_STRAIN = 1.5
 LITTLE_STRAIN = 0.005  # of lengths: lenses and tracks leave as much over with good shapes
-TOSS_UP = 1.1  # sureness, up to which another kind of thing may be as true
+TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
+FAIR_CHANGE = 0.04  # what a solid that does not deform leaves over, over its radius: the depth of more is a guess
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
@@ -180,6 +182,9 @@ def evidence(course: Course, found: Map, *, known: bool) -> Iterator[Verdict]:
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
+    change = found.evidence.solid.whole_px / rms_radius(found.rest.motion.shape)
+    if found.rest.kind == "rigid" and change > FAIR_CHANGE:
+        yield Verdict("fair", f"a solid that changes by {change:.0%} of its size: how deep its changes are is a guess")
     usual = float(np.nanmedian(np.asarray(course.errors)))
     if found.sheet is not None and found.sheet.strain_rms > max(FAIR_STRAIN * usual, LITTLE_STRAIN):
         told = f"its lengths change by {found.sheet.strain_rms:.1%}, more than noise explains: it stretches, or has creases"

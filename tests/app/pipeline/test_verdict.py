@@ -11,7 +11,7 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.selection import Evidence, Misfit
 
-REST = RestShape("rigid", RigidMotion(np.zeros((3, 9)), np.eye(3)[None], np.ones(1), np.zeros((1, 2))), "")
+REST = RestShape("rigid", RigidMotion(100 * np.eye(3, 9), np.eye(3)[None], np.ones(1), np.zeros((1, 2))), "")
 LEFT = Misfit(0.3, 0.3)
 EVIDENCE = Evidence("solid", LEFT, LEFT, LEFT, 0.005, 2.0, 30.0, 0.3)
 SOLID = Map(REST, Camera(), evidence=EVIDENCE)
@@ -56,6 +56,12 @@ def test_what_may_as_well_be_something_else() -> None:
     said = verdict(course([0.001] * 50), replace(SOLID, evidence=replace(EVIDENCE, sureness=1.02)))
     assert said.grade == "fair"
     assert "depth may be a guess" in said.reason
+
+
+def test_a_solid_that_changes_much() -> None:
+    said = verdict(course([0.001] * 50), replace(SOLID, evidence=replace(EVIDENCE, solid=Misfit(3.0, 3.3))))
+    assert said.grade == "fair"
+    assert "changes by 6%" in said.reason
 
 
 @pytest.mark.parametrize(("share", "grade"), [(0.9, "good"), (0.4, "fair"), (0.2, "poor")])
