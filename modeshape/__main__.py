@@ -13,6 +13,10 @@ def main() -> NoReturn:
     except FileNotFoundError:
         sys.stderr.write("error: the current folder is gone: change to another\n")
         sys.exit(2)
+    if sys.argv[1:2] == ["run"] and not {"-h", "--help", "--help-all"} & set(sys.argv):
+        from app.pipeline.stages.launched import WAITING, Launched
+
+        WAITING.append(Launched())
     from app.commands.cli import main as run
 
     run()

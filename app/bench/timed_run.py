@@ -25,7 +25,7 @@ def main() -> None:
     command = tyro.cli(Run)
     assert command.output.out is not None
     recording: Path = command.output.out
-    with Launched(command) as launched:
+    with Launched().begin(command) as launched:
         from app.bench.own_process import peak_mb
         from app.pipeline.session import Session
         from app.terminal.progress import Progress

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from app.options.run import Run
-from app.pipeline.stages.launched import Launched
+from app.pipeline.stages.launched import launched
 from app.terminal.progress import Progress
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ def run(command: Run, progress: Progress) -> "RunSummary":
     Raises:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and what helps.
     """
-    with Launched(command) as launched:
+    with launched().begin(command) as processes:
         from app.pipeline.session import Session  # it loads while the processes of the stages do
 
-        return Session(command, progress, launched=launched).run()
+        return Session(command, progress, launched=processes).run()

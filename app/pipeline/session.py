@@ -76,7 +76,7 @@ class Session:
         output = self._config.output
         needed = bool(self._record_unnamed or output.out or output.watched)
         self._wanted_again = needed or bool(output.shapes_out or self._config.ground_truth)
-        launched = self._launched or Launched(self._config, record=needed)
+        launched = self._launched or Launched(record=needed).begin(self._config)
         with threadpool_limits(1), launched, Stages(self._config, launched) as stages:
             self._tracking, self._begin_map, self.fps = stages.tracking, stages.begin_map, stages.tracking.opened.fps
             first, second = self._tracking.receive(), self._tracking.receive()

@@ -12,8 +12,8 @@ from app.processes.remote import Remote, serve
 class MapProcess:
     """Calls functions in another process, one after the other; a context manager that ends it, whatever it does."""
 
-    def __init__(self, remote: Remote) -> None:
-        self._remote = remote
+    def __init__(self) -> None:
+        self._remote = Remote("app.pipeline.stages.maps", "makes the models")
         self._calls = ThreadPoolExecutor(1, thread_name_prefix="map")  # sends, and waits for what comes back
 
     def begin(self, function: Callable[..., Any], *arguments: object) -> "Future[Any]":
@@ -26,6 +26,7 @@ class MapProcess:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         self._remote.end()  # which ends a call that is waited for
         self._calls.shutdown(cancel_futures=True)
+        self._remote.close()
 
     def _call(self, function: Callable[..., Any], *arguments: object) -> Any:
         self._remote.send((function, arguments))

@@ -47,7 +47,7 @@ class Stages:
     def __enter__(self) -> Self:
         with self._ends:  # what has begun ends if another cannot begin
             if self._launched.apart:
-                self.begin_map = self._ends.enter_context(MapProcess(self._launched.maps)).begin
+                self.begin_map = self._ends.enter_context(MapProcess()).begin
                 tracking = TrackingProcess(self._launched.tracking, self._launched.pictures)
                 self.tracking = self._ends.enter_context(tracking)
             else:

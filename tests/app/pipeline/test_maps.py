@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from app.pipeline.stages.maps import MapProcess
-from app.processes.remote import Remote
 from app.terminal.errors import UsageError
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
@@ -15,14 +14,10 @@ from reconstruction.settings import Settings
 from tests.reconstruction.runs import PERSPECTIVE, swelling_hill
 
 
-def process() -> Remote:
-    return Remote("app.pipeline.stages.maps", "makes the models")
-
-
 def test_a_model_is_the_same_from_there() -> None:
     W, _ = swelling_hill()
     arguments = W, np.ones((len(W), W.shape[2]), bool), PERSPECTIVE, Settings(), True
-    with MapProcess(process()) as maps:
+    with MapProcess() as maps:
         there = maps.begin(bootstrap, *arguments)
         here = bootstrap(*arguments)
         found = there.result()
@@ -33,19 +28,19 @@ def test_a_model_is_the_same_from_there() -> None:
 
 def test_errors_come_back() -> None:
     W = np.random.default_rng(0).normal(size=(3, 2, 3))
-    with MapProcess(process()) as maps, pytest.raises(ReconstructionError, match="fewer than 4 points"):
+    with MapProcess() as maps, pytest.raises(ReconstructionError, match="fewer than 4 points"):
         maps.begin(bootstrap, W, np.ones((3, 3), bool), Camera(), Settings(), True).result()
 
 
 def test_a_killed_process_is_told_of() -> None:
-    with MapProcess(process()) as maps:
+    with MapProcess() as maps:
         maps._remote.end()
         with pytest.raises(UsageError, match="has ended"):
             maps.begin(len, ()).result()
 
 
 def test_it_ends_whatever_it_does() -> None:
-    with MapProcess(process()) as maps:
+    with MapProcess() as maps:
         waiting = maps.begin(signal.pause)
     with pytest.raises(UsageError, match="has ended"):
         waiting.result()

@@ -156,7 +156,7 @@ def files(here: Path) -> Path:
     np.savez(here / "words.npz", W=np.full((3, 2, 4), "a"))
     np.savez(here / "objects.npz", W=np.full((3, 2, 4), None), allow_pickle=True)
     np.savez(here / "visible.npz", W=W, visible=np.ones((12, POINTS - 1), bool))
-    np.savez(here / "nan.npz", W=hole)
+    np.savez(here / "nan.npz", W=hole, visible=np.ones((12, POINTS), bool))
     np.savez(here / "truth.npz", W=W, S_gt=np.zeros((2, 3, POINTS - 1)), gt_frames=[0, 1])
     np.savez(here / "late.npz", W=W, S_gt=rng.normal(size=(2, 3, POINTS)), gt_frames=[0, 50])
     np.savez(here / "camera.npz", W=W, K=np.zeros((3, 3)))
