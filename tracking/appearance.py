@@ -1,6 +1,7 @@
 """Patches of the reference frame around the points, aligned to a frame to a fraction of a pixel."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import cv2
@@ -26,13 +27,24 @@ class Alignment:
         points_px: (n, 2) aligned positions.
         score: (n,) normalised cross-correlation there, -1 to 1.
         score_before: (n,) the same at the first guess.
-        covariance: (n, 2, 2) px² of the positions, by what the patches leave over: large along an edge.
+        spread: (n, 2, 2) inverse normal matrices of the patches, as they were.
+        affine: (n, 2, 2) maps from the patches to the picture.
+        samples: of a patch.
     """
 
     points_px: Array
     score: Array
     score_before: Array
-    covariance: Array
+    spread: Array
+    affine: Array
+    samples: int
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(n, 2, 2) px² of the positions, by what the patches leave over: large along an edge."""
+        noise = SHARED_ERROR * 2 * (1 - self.score).clip(1e-6) / self.samples
+        spread = self.affine @ self.spread @ np.swapaxes(self.affine, 1, 2)
+        return np.asarray(noise[:, None, None] * spread + FINEST * np.eye(2))
 
     @property
     def sigma_px(self) -> Array:
@@ -123,9 +135,7 @@ class Appearance:
             if len(moving) == 0:
                 break
             score[moving], slope = self._compare(image, points[moving], affine[moving], which[moving])
-        noise = SHARED_ERROR * 2 * (1 - score).clip(1e-6) / self._grid.shape[1]
-        covariance = noise[:, None, None] * (affine @ self._inverse[which] @ np.swapaxes(affine, 1, 2)) + FINEST * np.eye(2)
-        return Alignment(points, score, before, covariance)
+        return Alignment(points, score, before, self._inverse[which], affine, self._grid.shape[1])
 
     def _compare(self, image: Floats, points: Array, affine: Array, which: Indices) -> tuple[Array, Array]:
         """Score (n,) and half its falling slope (n, 2) where the picture is sampled for the points `which`."""
@@ -147,7 +157,7 @@ def _sample(image: Floats, centres: Array, affine: Array, grid: Floats) -> Float
 
 def _centre(patches: Floats) -> Floats:
     """Make the mean of each patch (n, m) zero, in place; their norms (n, 1)."""
-    patches -= patches.mean(axis=1, keepdims=True)
+    patches -= (patches @ np.full(patches.shape[1], 1 / patches.shape[1], np.float32))[:, None]  # faster than a mean
     return np.maximum(np.sqrt(_dot(patches, patches)), FLAT)[:, None]
 
 
