@@ -12,8 +12,7 @@ from tempfile import TemporaryFile
 from app.environment import environment
 
 NICE = 5  # of processes that frames do not wait for
-KEPT_BYTES = 32 * 2**20
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
+KEPT_BYTES = {-1: 16 * 2**20, -3: 32 * 2**20}  # by parameter of glibc's mallopt: M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
 
 
 def child(module: str, *files: int) -> tuple["subprocess.Popen[bytes]", Connection]:
@@ -46,8 +45,8 @@ def keep_memory() -> None:
     """Keep the memory of pictures and arrays for the next ones: to get it cleared by the system takes time."""
     with suppress(OSError, AttributeError):  # another C library
         mallopt = CDLL(None).mallopt
-        for parameter in (M_TRIM_THRESHOLD, M_MMAP_THRESHOLD):
-            mallopt(parameter, KEPT_BYTES)
+        for parameter, most in KEPT_BYTES.items():
+            mallopt(parameter, most)
 
 
 def connection_to_parent(*, nice: int = 0) -> Connection:
