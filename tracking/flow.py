@@ -12,11 +12,11 @@ from tracking import Array, Flags, Image, Indices
 WINDOW_PX = 15
 # The guides find the motion, the others only refine it. With all points on all levels, 21 % of kinect_paper's
 # fail between frames 60 and 61 (its texture repeats), in 20 ms; led by guides, none, in 8 ms (one core). Guides are
-# followed in the half picture, which is as good a guide at a quarter of the cost. Dense flow (DIS, ultrafast) as the guide
-# brings 97.7 % of 1,475 points back in 9.4 ms, these guides 98.1 % in 8.7 ms.
+# followed in the half picture, or a smaller one if that is large, which is as good a guide at a quarter of the cost. Dense
+# flow (DIS, ultrafast) as the guide brings 97.7 % of 1,475 points back in 9.4 ms, these guides 98.1 % in 8.7 ms.
 GUIDES = 150
-GUIDE_WINDOWS_PX = (11, 31)  # of the half picture; the second for those that do not come back with the first
-GUIDE_LEVELS = 3  # halvings of a half picture 320 px wide
+GUIDE_WINDOWS_PX = (11, 31)  # of the small picture; the second for those that do not come back with the first
+SMALL_PX, LEVELS = 320, 3  # a picture so wide is halved so many times more
 NEAREST_GUIDES = 8  # guides whose median motion a point starts from
 FEW_GUIDES = 0.7  # of the guides: come fewer back, the light may have changed
 LIGHT = 0.15  # the usual change of brightness at a guide, as a share: noise makes up to 0.1 of it, more is light
@@ -45,6 +45,14 @@ class Grays:
         """Of a picture (H, W, 3) uint8."""
         gray = cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)
         return cls(cast(Image, gray), cast(Image, cv2.pyrDown(gray)))
+
+    @cached_property
+    def small(self) -> tuple[Image, int]:
+        """The picture to follow guides in, at most half as large, and how many of its pixels are one."""
+        picture, scale = self.half, 2
+        while max(picture.shape) > np.sqrt(2) * SMALL_PX:
+            picture, scale = cast(Image, cv2.pyrDown(picture)), 2 * scale
+        return picture, scale
 
     @cached_property
     def evened(self) -> "Grays":
@@ -93,7 +101,7 @@ class Flow:
                 before, now, motion = before.evened, now.evened, its_motion
         motion, levels = motion[seen], 0
         if not np.isfinite(motion[0, 0]):
-            motion, levels = np.zeros_like(motion), levels_of(now) + 1
+            motion, levels = np.zeros_like(motion), levels_of(now.full)
         start = points_px[seen]
         there, good = lucas_kanade(before.full, now.full, start, motion, WINDOW_PX, levels, CONVERGED_PX)
         far = np.flatnonzero(np.linalg.norm(there - start - motion, axis=1) > GUESSED_PX)
@@ -106,18 +114,19 @@ class Flow:
 
         And the share of the guides that came back, and by how much their brightness has changed, as a share: the median.
         """
-        levels = levels_of(now)
+        (old, scale), (new, _) = before.small, now.small
+        levels = levels_of(new)
         guides = self._order[np.isfinite(points_px[self._order, 0])][:GUIDES]
-        start = points_px[guides] / 2
+        start = points_px[guides] / scale
         moved, good = np.zeros_like(start), np.zeros(len(start), np.bool_)
         for window in GUIDE_WINDOWS_PX:
             left = np.flatnonzero(~good)
             still = np.zeros((len(left), 2))
             if len(left):
-                moved[left], found = lucas_kanade(before.half, now.half, start[left], still, window, levels, CONVERGED_PX)
-                good[left] = found & returned(before.half, now.half, start[left], moved[left], still, window, levels)
-        light = change_of_light(before.half, now.half, start[good], moved[good])
-        guides, motion = guides[good], 2 * (moved - start)[good]
+                moved[left], found = lucas_kanade(old, new, start[left], still, window, levels, CONVERGED_PX)
+                good[left] = found & returned(old, new, start[left], moved[left], still, window, levels)
+        light = change_of_light(old, new, start[good], moved[good])
+        guides, motion = guides[good], scale * (moved - start)[good]
         if len(guides) < NEAREST_GUIDES:
             return np.full_like(points_px, np.nan), 0.0, 0.0
         if not np.array_equal(guides, self._guides):  # seldom
@@ -147,9 +156,9 @@ def change_of_light(before: Image, now: Image, start: Array, there: Array) -> fl
     return float(np.median(np.abs(np.log((new + 8.0) / (old + 8.0)))))  # what is black has no share
 
 
-def levels_of(grays: Grays) -> int:
-    """Halvings of a half picture in which guides are followed."""
-    return GUIDE_LEVELS + max(0, round(np.log2(max(grays.half.shape) / 320.0)))
+def levels_of(picture: Image) -> int:
+    """Halvings of a picture in which what moves far is followed."""
+    return LEVELS + max(0, round(np.log2(max(picture.shape) / SMALL_PX)))
 
 
 def lucas_kanade(

@@ -127,7 +127,7 @@ def followed(before: Grays, now: Grays, points_px: Array) -> tuple[Array, Flags]
         there, good = lucas_kanade(before.full, now.full, some, guess, window, levels, CONVERGED_PX)
         return there, good & returned(before.full, now.full, some, there, guess, window, levels)
 
-    levels = levels_of(now) + 1
+    levels = levels_of(now.full)
     there, good = follow(points_px, np.zeros_like(points_px), WINDOW_PX, levels)
     lost = np.flatnonzero(~good)
     if len(lost):
