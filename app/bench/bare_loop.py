@@ -10,7 +10,7 @@ import numpy as np
 
 from tracking import Array, Image
 from tracking.features import detect_corners
-from tracking.flow import GUIDE_LEVELS, GUIDES, Grays, spread_order
+from tracking.flow import GUIDES, LEVELS, Grays, spread_order
 from tracking.region.mask import region_mask
 
 WINDOW_PX, GUIDE_WINDOW_PX = 15, 11  # what a tracker needs that has nothing but this to go by
@@ -31,7 +31,7 @@ def bare_loop(video: str, roi: tuple[int, int, int, int], points: int, frames: i
         if not good:
             break
         now = Grays.of(cast(Image, image))
-        there_and_back(before.half, now.half, at[:GUIDES] / 2, GUIDE_WINDOW_PX, GUIDE_LEVELS)
+        there_and_back(before.half, now.half, at[:GUIDES] / 2, GUIDE_WINDOW_PX, LEVELS)
         there = there_and_back(before.full, now.full, at, WINDOW_PX, 0)
         inside = ((there > 0) & (there < size)).all(axis=1)
         at[inside] = there[inside]
