@@ -11,8 +11,8 @@ from reconstruction.basis.mesh import triangulate, unique_edges
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import Kind, RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
-from reconstruction.mapping.isometric.adjustment import bundled, by_part, sheet, with_focal
-from reconstruction.mapping.isometric.focal import focal
+from reconstruction.mapping.isometric.adjustment import bundled, by_part, sheet
+from reconstruction.mapping.isometric.focal import focal, under
 from reconstruction.mapping.isometric.sheet import Foreseen, IsometricSheet
 from reconstruction.mapping.selection import Evidence, select
 from reconstruction.mapping.solid.freedom import modes_held
@@ -185,7 +185,7 @@ def sheet_map(
     if estimate_focal and camera.perspective:
         search = focal(found)
         if search.known:
-            found = with_focal(found, search.focal_px)
+            found = under(found, search.focal_px)
             camera = found.camera
     found = bundled(found, W) if last else found
     shapes = found.shapes()

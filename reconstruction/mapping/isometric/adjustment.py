@@ -61,6 +61,15 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
     warps = smooth_warps(W, visible)
     if len(W) < 3 or warps.placed.sum() < 20:
         raise ReconstructionError("a sheet of unknown shape needs 3 keyframes and 20 points")
+    return on_smooth_images(warps, camera)
+
+
+def on_smooth_images(warps: Warps, camera: Camera) -> IsometricSheet:
+    """The sheet that is seen in smooth images.
+
+    Raises:
+        ReconstructionError: no depths keep the lengths.
+    """
     nodes = nodes_of(warps)
     field = smooth_field(nodes.reference, FUNCTIONS)
     values = np.full((len(warps.placed), len(field.stiffness)), np.nan)

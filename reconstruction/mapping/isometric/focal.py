@@ -1,21 +1,24 @@
 """The focal length under which a sheet keeps its lengths best."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
-from reconstruction.arrays import Array
-from reconstruction.mapping.isometric.adjustment import by_part, with_focal
+from reconstruction import ReconstructionError
+from reconstruction.mapping.isometric.adjustment import by_part, on_smooth_images, with_focal
 from reconstruction.mapping.isometric.lengths import robust_lengths
 from reconstruction.mapping.isometric.nodes import edges_between
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 
-FACTORS = (0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8, 2.3, 3.0)  # of the focal length that are tried first
-CLOSER = (0.93, 1.0, 1.08)
+FACTORS = (0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8, 2.3, 3.0, 4.0)  # of the focal length that are tried first
+CLOSER = 1.05  # ... and then, by all frames, in steps of this factor
+MOST = 9  # of those
 RISE = 1.3  # times the least change of length, to which it must rise on both sides
 ALIKE = 1.02  # times the least change of length, up to which the focal length assumed so far is as good
-FRAMES = 15  # those that differ most tell it
+FRAMES = 15  # those that differ most tell it roughly
 EXACT = 1e-9  # change of length that is none
+FAR_OFF = 1.15  # times another focal length
 ENOUGH = 1.1 * RISE  # ... and beyond which no focal length is tried on that side
 
 
@@ -25,15 +28,11 @@ class FocalSearch:
 
     Attributes:
         focal_px: under which lengths change least.
-        known: whether they change clearly more on both sides.
-        tried_px: (k,) focal lengths, ascending.
-        strain: (k,) typical change of length under each.
+        known: whether they change clearly more on both sides, or under the focal length assumed so far.
     """
 
     focal_px: float
     known: bool
-    tried_px: Array
-    strain: Array
 
 
 def typical_strain(sheet: IsometricSheet) -> float:
@@ -44,16 +43,13 @@ def typical_strain(sheet: IsometricSheet) -> float:
 
 
 def focal(sheet: IsometricSheet) -> FocalSearch:
-    """Focal length by the change of length: least at the true one; the parabola through the three least, in log focal."""
-    tried: dict[float, tuple[IsometricSheet, float]] = {}
+    """Focal length by the change of length: least at the true one."""
+    tried: dict[float, float] = {}
 
     def look(focal_px: float, start: IsometricSheet) -> IsometricSheet:
         found = with_focal(start, focal_px)
-        tried[focal_px] = found, typical_strain(found)
+        tried[focal_px] = typical_strain(found)
         return found
-
-    def best() -> IsometricSheet:
-        return min(tried.values(), key=lambda one: one[1])[0]
 
     f, middle = sheet.camera.focal_px, FACTORS.index(1.0)
     here = look(f, by_part(sheet, np.arange(min(FRAMES, len(sheet.coefficients)))))
@@ -61,20 +57,44 @@ def focal(sheet: IsometricSheet) -> FocalSearch:
         at = here  # outwards from the middle, each from the one before
         for factor in side:
             at = look(f * factor, at)
-            if tried[f * factor][1] > ENOUGH * min(strain for _, strain in tried.values()):
+            if tried[f * factor] > ENOUGH * min(tried.values()):
                 break
-    for factor in CLOSER:
-        if (focal_px := best().camera.focal_px * factor) not in tried:
-            look(focal_px, best())
     focals = np.array(sorted(tried))
-    strains = np.array([tried[focal_px][1] for focal_px in focals])
+    strains = np.array([tried[focal_px] for focal_px in focals])
     k = int(strains.argmin())
-    known = min(strains[:k].max(initial=0.0), strains[k + 1 :].max(initial=0.0)) > RISE * strains[k]
-    if strains[focals == f][0] < ALIKE * strains[k]:
-        return FocalSearch(f, bool(known), focals, strains)
-    if 0 < k < len(focals) - 1:
-        x, y = np.log(focals[k - 1 : k + 2]), strains[k - 1 : k + 2] ** 2
-        a, b, _ = np.polyfit(x - x[1], y, 2)
-        lowest = float(np.clip(-b / (2 * a), x[0] - x[1], x[2] - x[1])) if a > 0 else 0.0
-        return FocalSearch(float(np.exp(x[1] + lowest)), bool(known), focals, strains)
-    return FocalSearch(float(focals[k]), False, focals, strains)
+    focal_px, least = closer(sheet, float(focals[k]))
+    assumed = typical_strain(sheet)
+    # A long lens shows so little perspective that a longer one changes hardly anything: the one assumed does.
+    both_sides = min(strains[:k].max(initial=0.0), strains[k + 1 :].max(initial=0.0)) > RISE * strains[k]
+    known = 0 < k < len(focals) - 1 and (both_sides or assumed > RISE * least)
+    return FocalSearch(f if assumed < ALIKE * least else focal_px, bool(known))
+
+
+def closer(sheet: IsometricSheet, near_px: float) -> tuple[float, float]:
+    """Focal length of least change in all frames, near another, and that change.
+
+    The parabola through the three least, in the logarithm of the focal length.
+    """
+    found = {0: with_focal(sheet, near_px)}
+    strain = {0: typical_strain(found[0])}
+    best = 0
+    while len(strain) < MOST and not {best - 1, best + 1} <= strain.keys():
+        for k in {best - 1, best + 1} - strain.keys():
+            found[k] = with_focal(found[best], near_px * CLOSER**k)
+            strain[k] = typical_strain(found[k])
+        best = min(strain, key=strain.__getitem__)
+    if not {best - 1, best + 1} <= strain.keys():
+        return float(near_px * CLOSER**best), strain[best]
+    less, least, more = (strain[best + side] ** 2 for side in (-1, 0, 1))
+    lowest = (less - more) / max(2 * (less - 2 * least + more), EXACT**2)
+    return float(near_px * CLOSER ** (best + np.clip(lowest, -1, 1))), strain[best]
+
+
+def under(found: IsometricSheet, focal_px: float) -> IsometricSheet:
+    """A sheet under another focal length; where that is far off, started anew as well: it may have been folded wrongly."""
+    near = with_focal(found, focal_px)
+    if max(focal_px, found.camera.focal_px) < FAR_OFF * min(focal_px, found.camera.focal_px):
+        return near
+    with suppress(ReconstructionError):
+        return min(near, on_smooth_images(found.warps, near.camera), key=typical_strain)
+    return near

@@ -10,7 +10,7 @@ from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.isometric.adjustment import bundled, sheet
-from reconstruction.mapping.isometric.focal import focal
+from reconstruction.mapping.isometric.focal import focal, under
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 
@@ -108,12 +108,14 @@ def test_part_that_is_out_of_sight_does_not_spoil_the_rest() -> None:
     assert float(e3d(found.shapes()[whole], S[whole]).mean()) < 0.03
 
 
-def test_lengths_hold_the_focal_length() -> None:
-    W, _, _ = waving()
-    wrong = replace(CAMERA, focal_px=1.25 * CAMERA.focal_px)
-    search = focal(sheet(W, SEEN, wrong))
+@pytest.mark.parametrize("off", [0.7, 0.8, 1.25, 2.0])
+def test_lengths_hold_the_focal_length(off: float) -> None:
+    W, S, _ = waving()
+    wrong = sheet(W, SEEN, replace(CAMERA, focal_px=off * CAMERA.focal_px))
+    search = focal(wrong)
     assert search.known
-    assert search.focal_px == pytest.approx(CAMERA.focal_px, rel=0.08)
+    assert search.focal_px == pytest.approx(CAMERA.focal_px, rel=0.05)
+    assert error(under(wrong, search.focal_px), S) < 0.02
 
 
 def test_what_cannot_be_done_is_said() -> None:
