@@ -11,7 +11,7 @@ from reconstruction.basis.mesh import triangulate, unique_edges
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import Kind, RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
-from reconstruction.mapping.isometric.adjustment import bundled, by_part, sheet
+from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, sheet
 from reconstruction.mapping.isometric.focal import focal, under
 from reconstruction.mapping.isometric.sheet import Foreseen, IsometricSheet
 from reconstruction.mapping.selection import Evidence, select
@@ -187,7 +187,7 @@ def sheet_map(
         if search.known:
             found = under(found, search.focal_px)
             camera = found.camera
-    found = bundled(found, W) if last else found
+    found = bundled(found, W, BUNDLE_ROUNDS if last else FEW_ROUNDS)
     shapes = found.shapes()
     known = np.isfinite(shapes).all(axis=(0, 1))
     middle = medoid(shapes[:, :, known])

@@ -31,6 +31,7 @@ from reconstruction.mapping.isometric.warps import Warps, smooth_warps
 FUNCTIONS = 40
 START_FRAMES = 10  # of the convex start
 BUNDLE_ROUNDS = 8  # of shapes, then places and lengths: with much noise they are still getting better
+FEW_ROUNDS = 2  # bring most of that in a tenth of a second
 ROUNDS = 6  # at most, of starting frames again that do not fit
 OTHER_STARTS = 2
 FIRM_START = 100.0  # times the bending weight, before it is let go
@@ -101,17 +102,18 @@ def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:
     return by_part(replace(found, camera=replace(found.camera, focal_px=focal_px)), np.arange(len(found.coefficients)))
 
 
-def bundled(found: IsometricSheet, W: Array) -> IsometricSheet:
+def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> IsometricSheet:
     """The sheet with shapes, lengths and the places of its points on the reference image adjusted together.
 
     Args:
         found: what its keyframes say, image by image.
         W: (F, 2, p) px, its keyframes; anything where not visible.
+        rounds: of shapes, then places and lengths.
     """
     weights = found.warps.weights * found.warps.inlier / found.warps.noise_px[:, None] ** 2
     W, shapes, placed = np.where(weights[:, None] > 0, W, 0.0), found.shapes(), found.warps.placed
     rays = rays_of(W, found.camera)[:, :2, placed]
-    for _ in range(BUNDLE_ROUNDS):
+    for _ in range(rounds):
         C = found.bundled(shapes, W, weights)
         places = found.warps.reference.copy()
         slopes = found.warps.field.slopes_at(places[:, placed])[:, : C.shape[2]]
