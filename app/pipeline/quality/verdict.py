@@ -15,6 +15,7 @@ from app.arrays import Flags
 from reconstruction.basis.rest_shape import rms_radius
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.map import Map
+from reconstruction.mapping.solid.solid import relief
 
 Grade = Literal["good", "fair", "poor"]
 GRADES: tuple[Grade, ...] = ("poor", "fair", "good")
@@ -32,6 +33,7 @@ FAIR_STRAIN = 1.5
 LITTLE_STRAIN = 0.005  # of lengths: lenses and tracks leave as much over with good shapes
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 FAIR_CHANGE = 0.03  # what a solid that does not deform leaves over, over its radius: the depth of more is a guess
+OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
@@ -185,6 +187,10 @@ def evidence(course: Course, found: Map, *, known: bool) -> Iterator[Verdict]:
     change = found.evidence.solid.whole_px / rms_radius(found.rest.motion.shape)
     if found.rest.kind == "rigid" and change > FAIR_CHANGE:
         yield Verdict("fair", f"a solid that changes by {change:.0%} of its size: how deep its changes are is a guess")
+    deep, half = relief(found.rest.motion.shape), found.evidence.relief
+    if found.rest.kind == "rigid" and max(deep, half) > OTHERWISE_DEEP * min(deep, half):
+        told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"
+        yield Verdict("fair", f"{told}; film it turning more")
     usual = float(np.nanmedian(np.asarray(course.errors)))
     if found.sheet is not None and found.sheet.strain_rms > max(FAIR_STRAIN * usual, LITTLE_STRAIN):
         told = f"its lengths change by {found.sheet.strain_rms:.1%}, more than noise explains: it stretches, or has creases"

@@ -10,10 +10,11 @@ from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.selection import Evidence, Misfit
+from reconstruction.mapping.solid.solid import relief
 
 REST = RestShape("rigid", RigidMotion(100 * np.eye(3, 9), np.eye(3)[None], np.ones(1), np.zeros((1, 2))), "")
 LEFT = Misfit(0.3, 0.3)
-EVIDENCE = Evidence("solid", LEFT, LEFT, LEFT, 0.005, 2.0, 30.0, 0.3)
+EVIDENCE = Evidence("solid", LEFT, LEFT, LEFT, 0.005, 2.0, 30.0, relief(REST.motion.shape))
 SOLID = Map(REST, Camera(), evidence=EVIDENCE)
 
 
@@ -62,6 +63,14 @@ def test_a_solid_that_changes_much() -> None:
     said = verdict(course([0.001] * 50), replace(SOLID, evidence=replace(EVIDENCE, solid=Misfit(3.0, 3.3))))
     assert said.grade == "fair"
     assert "changes by 6%" in said.reason
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_solid_that_half_of_the_keyframes_find_otherwise_deep(factor: float) -> None:
+    half = replace(EVIDENCE, relief=factor * EVIDENCE.relief)
+    said = verdict(course([0.001] * 50), replace(SOLID, evidence=half))
+    assert said.grade == "fair"
+    assert "depth is a guess" in said.reason
 
 
 @pytest.mark.parametrize(("share", "grade"), [(0.9, "good"), (0.4, "fair"), (0.2, "poor")])
