@@ -18,6 +18,7 @@ RISE = 1.3  # times the least change of length, to which it must rise on both si
 ALIKE = 1.02  # times the least change of length, up to which the focal length assumed so far is as good
 FRAMES = 15  # those that differ most tell it roughly
 EXACT = 1e-9  # change of length that is none
+WELL = 0.003  # change of lengths: less is not to be had
 FAR_OFF = 1.15  # times another focal length
 ENOUGH = 1.1 * RISE  # ... and beyond which no focal length is tried on that side
 
@@ -93,7 +94,7 @@ def closer(sheet: IsometricSheet, near_px: float) -> tuple[float, float]:
 def under(found: IsometricSheet, focal_px: float) -> IsometricSheet:
     """A sheet under another focal length; where that is far off, started anew as well: it may have been folded wrongly."""
     near = with_focal(found, focal_px)
-    if max(focal_px, found.camera.focal_px) < FAR_OFF * min(focal_px, found.camera.focal_px):
+    if near.strain_rms < WELL or max(focal_px, found.camera.focal_px) < FAR_OFF * min(focal_px, found.camera.focal_px):
         return near
     with suppress(ReconstructionError):
         return min(near, on_smooth_images(found.warps, near.camera), key=typical_strain)
