@@ -16,6 +16,7 @@ from typing import Annotated, Any, NoReturn
 import tyro
 
 from app.environment import environment
+from app.memory import keep_memory
 from app.options.batch import Batch
 from app.options.bench import Bench
 from app.options.evaluate import Evaluate
@@ -26,7 +27,6 @@ from app.options.reproduce import Reproduce
 from app.options.retexture import Retexture
 from app.options.review import Review
 from app.options.run import Demo, Run
-from app.processes.child import keep_memory
 from app.terminal.arguments import meant, spelled_out
 from app.terminal.errors import UsageError, in_a_line
 from app.terminal.exit_code import ExitCode

@@ -3,16 +3,14 @@
 import os
 import subprocess
 import sys
-from contextlib import suppress
-from ctypes import CDLL
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from tempfile import TemporaryFile
 
 from app.environment import environment
+from app.memory import keep_memory
 
 NICE = 5  # of processes that frames do not wait for
-KEPT_BYTES = {-1: 16 * 2**20, -3: 32 * 2**20}  # by parameter of glibc's mallopt: M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
 
 
 def child(module: str, *files: int) -> tuple["subprocess.Popen[bytes]", Connection]:
@@ -39,14 +37,6 @@ def started(module: str, *files: int) -> "subprocess.Popen[bytes]":
         pass_fds=files,
         start_new_session=True,  # Ctrl-C ends the run, which then tells what is left to do
     )
-
-
-def keep_memory() -> None:
-    """Keep the memory of pictures and arrays for the next ones: to get it cleared by the system takes time."""
-    with suppress(OSError, AttributeError):  # another C library
-        mallopt = CDLL(None).mallopt
-        for parameter, most in KEPT_BYTES.items():
-            mallopt(parameter, most)
 
 
 def connection_to_parent(*, nice: int = 0) -> Connection:
