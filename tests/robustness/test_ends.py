@@ -28,7 +28,8 @@ def start(video: Path, folder: Path, *options: str, limit: int | None = None) ->
     """A run in a process of its own, its files no larger than `limit` bytes."""
 
     def prepare() -> None:
-        signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs ignore it
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs ignore it, ...
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)  # ... and what nohup began this
         if limit is not None:
             signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
             resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
