@@ -23,8 +23,10 @@ SEARCH_EVERY_FRAME = 15  # so many frames it is searched for in each frame; late
 SEARCH_EVERY = 5  # ... in one out of so many
 PARTLY = 0.75  # share of the points: while fewer are seen, the others are looked for by their features, too, ...
 REGAIN_EVERY, REGAIN_SELDOM = 8, 32  # ... in one out of so many frames, less and less often while that brings ...
-REGAINED = 0.02  # ... less than this share
-REGAIN_SIDE_PX = 480  # of the picture for that: it must not take long
+REGAINED = 0.02  # ... less than this share, ...
+UNCOVERED_EVERY = 2  # ... but no less often than in one out of so many while what is in front moves: ...
+UNCOVERED = 0.1  # ... this share of the points has come into sight or gone since
+REGAIN_SIDE_PX = 640  # of the picture, of which only the part around the others is taken: it must not take long
 SAME_SHARE = 0.75  # of the share seen before: so many at the same place need no search
 
 
@@ -83,6 +85,7 @@ class GuardedTracker:
         self._left_behind = LeftBehind(points_px)
         self._relocalisation: Relocalisation | None = None
         self._regain_every, self._partly = REGAIN_EVERY, 0  # frames; of them those in which it is seen only partly
+        self._seen_then = np.ones(len(points_px), np.bool_)  # when the others were looked for
         self._shares = deque([1.0], RECENT_FRAMES)  # of the points seen in the last frames
         self._last_px = points_px.copy()  # where the surface was last: seen or predicted
         self.lost = False
@@ -92,7 +95,8 @@ class GuardedTracker:
         """Find the points in the next frame; `predicted_px` (P, 2) as for `PointTracker.track`."""
         if self.lost:
             return self._search(image_bgr)
-        observation = self._regained(self._tracker.track(image_bgr, predicted_px), image_bgr)
+        expected_px = self._last_px if predicted_px is None else predicted_px
+        observation = self._regained(self._tracker.track(image_bgr, predicted_px), image_bgr, expected_px)
         share = self._share(observation)
         just_now = max(self._shares)
         jumped = share < COLLAPSED_SHARE * just_now and share < FEW_SHARE
@@ -106,7 +110,7 @@ class GuardedTracker:
         self._shares.append(share)
         self._image = image_bgr
         seen = observation.visible[:, None]
-        self._last_px = np.where(seen, observation.points_px, self._last_px if predicted_px is None else predicted_px)
+        self._last_px = np.where(seen, observation.points_px, expected_px)
         behind = self._left_behind.look(observation)
         if not behind:
             return Guarded(observation)
@@ -145,19 +149,21 @@ class GuardedTracker:
         lasted = f", after {frames} frame{'s' if frames > 1 else ''}" if frames else ""
         return Guarded(found, Change.RECOVERED, f"found {how}, {share:.0%} of the points{lasted}")
 
-    def _regained(self, observation: Observation, image_bgr: Image) -> Observation:
+    def _regained(self, observation: Observation, image_bgr: Image, expected_px: Array) -> Observation:
         """With points that have come into sight far from where they were expected, if it is time to look for them."""
         share = self._share(observation)
         self._partly = self._partly + 1 if LOST_SHARE < share < PARTLY else 0
         if not self._partly:
             self._regain_every = REGAIN_EVERY
-        if self._partly < self._regain_every:
+        moves = np.mean(observation.visible != self._seen_then) > UNCOVERED
+        if self._partly < (UNCOVERED_EVERY if moves else self._regain_every):
             return observation
         self._partly = 0
-        places = self._features.find(image_bgr, REGAIN_SIDE_PX)
+        places = self._features.find(image_bgr, REGAIN_SIDE_PX, expected_px[~observation.visible])
         regained = observation if places is None else self._tracker.regain(places)
         worth = self._share(regained) > share + REGAINED
         self._regain_every = REGAIN_EVERY if worth else min(2 * self._regain_every, REGAIN_SELDOM)
+        self._seen_then = regained.visible
         return regained
 
     @property

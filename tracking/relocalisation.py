@@ -15,6 +15,7 @@ AFFINE_ERROR = 0.08  # of the surface's extent: how far a bent surface may be of
 LOCAL_ERROR = 0.03  # of the extent: how far a match may be off its neighbours'
 INFLUENCE = 0.12  # of the extent: standard deviation of the weight of a match around it
 ROUNDS = 3  # of rejecting matches by their neighbours
+AROUND = 0.2  # of the extent, around the places near which the surface is looked for
 MIN_MATCHES = 15  # fewer may agree by chance
 SCALES = (0.2, 5.0)  # between the smallest and the largest stretch of the affine map, against the reference
 
@@ -33,16 +34,22 @@ class Relocalisation:
         mask = np.zeros(image_bgr.shape[:2], np.uint8)
         hull = cv2.convexHull(points_px.astype(np.float32).reshape(-1, 1, 2))
         cv2.fillConvexPoly(mask, np.rint(hull).astype(np.int32), (255,))
-        self._places, self._described = self._features(image_bgr, cv2.SIFT.create(FEATURES), mask, SIDE_PX)
+        scale = min(1.0, SIDE_PX / max(mask.shape))
+        self._places, self._described = self._features(image_bgr, cv2.SIFT.create(FEATURES), mask, scale)
 
-    def find(self, image_bgr: Image, side_px: int = SIDE_PX) -> Array | None:
+    def find(self, image_bgr: Image, side_px: int = SIDE_PX, near_px: Array | None = None) -> Array | None:
         """Where the points are in a picture, to some pixels: (P, 2), NaN where no match is near; None if nowhere.
 
         Args:
             image_bgr: (H, W, 3) uint8.
             side_px: larger pictures are made smaller: to save time.
+            near_px: (n, 2) places around which features are looked for: to save time; None is everywhere.
         """
-        places, described = self._features(image_bgr, cv2.SIFT.create(PICTURE_FEATURES), None, side_px)
+        scale = min(1.0, side_px / max(image_bgr.shape))
+        left, top, right, bottom = _around(near_px, AROUND * self._extent, image_bgr.shape)
+        cut = image_bgr[top:bottom, left:right]
+        places, described = self._features(cut, cv2.SIFT.create(PICTURE_FEATURES), None, scale)
+        places += (left, top)
         if len(places) < MIN_MATCHES or len(self._places) < MIN_MATCHES:
             return None
         matches = cv2.BFMatcher(cv2.NORM_L2).knnMatch(self._described, described, k=2)
@@ -82,9 +89,8 @@ class Relocalisation:
         total = w.sum(axis=1)
         return w @ off / np.maximum(total, 1e-12)[:, None], total
 
-    def _features(self, image_bgr: Image, sift: cv2.SIFT, mask: Image | None, side_px: int) -> tuple[Array, Floats]:
+    def _features(self, image_bgr: Image, sift: cv2.SIFT, mask: Image | None, scale: float) -> tuple[Array, Floats]:
         gray = cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)
-        scale = min(1.0, side_px / max(gray.shape))
         if scale < 1.0:
             gray = cv2.resize(gray, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
             mask = None if mask is None else cast(Image, cv2.resize(mask, gray.shape[::-1]))
@@ -98,3 +104,15 @@ class Relocalisation:
 def _mapped(affine: Array, points: Array) -> Array:
     """Points (n, 2) under a map (2, 3)."""
     return points @ affine[:, :2].T + affine[:, 2]
+
+
+def _around(points_px: Array | None, margin_px: float, shape: tuple[int, ...]) -> tuple[int, int, int, int]:
+    """Left, top, right, bottom of the part of a picture around points (n, 2), NaN if unknown; without any, all of it."""
+    height, width = shape[:2]
+    known = np.empty((0, 2)) if points_px is None else points_px[np.isfinite(points_px).all(axis=1)]
+    if len(known):
+        left, top = (known.min(axis=0) - margin_px).clip(0, (width, height)).astype(int).tolist()
+        right, bottom = (known.max(axis=0) + margin_px).clip(0, (width, height)).astype(int).tolist()
+        if min(right - left, bottom - top) > margin_px:
+            return left, top, right, bottom
+    return 0, 0, width, height

@@ -12,8 +12,6 @@ from tests.robustness.degraded import Result, run
 
 FRAMES = 100
 KINECT_ROI = (195, 95, 325, 265)
-# What is hidden for long is a guess; a tenth above what was measured.
-SHORT = {"a thing crosses slowly": 5.0, "leaves the picture, most": 4.0}
 
 
 def outcome(clip: Clip, name: str, folder: Path) -> Result:
@@ -46,4 +44,4 @@ def test_the_printed_sheet_holds(shared_data: Path, tmp_path: Path, name: str) -
     if wanted is None:
         assert result.words["verdict"] == "poor"
     else:
-        assert 100 * result.e3d.mean() <= SHORT.get(name, wanted)
+        assert 100 * result.e3d.mean() <= wanted

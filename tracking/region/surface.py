@@ -125,8 +125,8 @@ def surface_mask(place: Array, own: Flags, others: Flags, region: Image) -> Imag
     to_own, to_other = (distance_to(place[which], region.shape[:2]) for which in (own, others))
     nearer = np.asarray(to_own <= to_other, np.uint8)
     near = nearer * (to_own < REACH * spacing)
-    whole = cv2.morphologyEx(near, cv2.MORPH_CLOSE, disc(GAP * spacing)) * nearer
-    smooth = cv2.morphologyEx(whole, cv2.MORPH_OPEN, disc(REACH * spacing))
+    whole = (1 - grown(1 - grown(near, GAP * spacing), GAP * spacing)) * nearer
+    smooth = grown(1 - grown(1 - whole, REACH * spacing), REACH * spacing)
     smooth = smooth if smooth.any() else near  # points too far apart for anything smooth
     contours, levels = cv2.findContours(smooth, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     mask = np.zeros(region.shape[:2], np.uint8)
@@ -145,10 +145,11 @@ def surface_mask(place: Array, own: Flags, others: Flags, region: Image) -> Imag
     return cast(Image, mask & region)
 
 
-def disc(radius_px: float) -> Image:
-    """A round structuring element."""
-    side = 2 * int(np.ceil(radius_px)) + 1
-    return cast(Image, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (side, side)))
+def grown(mask: Image, radius_px: float) -> Image:
+    """What is no farther than so much from a mask (H, W) of 0 and 1: takes the same time however far that is."""
+    if not mask.any():
+        return mask
+    return np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= radius_px, np.uint8)
 
 
 def distance_to(points: Array, shape: tuple[int, int]) -> Floats:
