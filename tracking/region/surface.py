@@ -149,7 +149,7 @@ def grown(mask: Image, radius_px: float) -> Image:
     """What is no farther than so much from a mask (H, W) of 0 and 1: takes the same time however far that is."""
     if not mask.any():
         return mask
-    return np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= radius_px, np.uint8)
+    return np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= np.ceil(radius_px), np.uint8)
 
 
 def distance_to(points: Array, shape: tuple[int, int]) -> Floats:
