@@ -70,7 +70,7 @@ class Successor:
             if seen.time_s >= self._due_s:
                 self._number = next(self._numbers)
             return
-        if self._number not in seen.objects:  # asked for, but frames before that are still on the way
+        if self._number not in seen.objects:  # it is looked for, or frames before that are still on the way
             return
         try:
             good = self._goes_on(self._number, seen, picture)

@@ -107,17 +107,37 @@ class Search:
         return True
 
     def surfaces(self) -> list[Surface]:
-        """What moves, by the frames so far, the best first."""
-        return surfaces(self._compared(), self._region)
+        """What moves, by the frames so far, the best first; where it was in the first of them."""
+        return surfaces(compared(self._tracks), self._region)
 
-    def _compared(self) -> Array:
-        """Tracks (F, P, 2) in frames well spread, most of them early: what is soon covered shows only there how it goes."""
-        chosen = np.unique(((self.frames - 1) * np.linspace(0, 1, COMPARED) ** 2).round().astype(int))
-        return np.stack([self._tracks[k] for k in chosen])
+    def region_now(self) -> Image:
+        """Where what moves most is in the last frame, (H, W) uint8.
+
+        Raises:
+            TrackingError: nothing moves.
+        """
+        last = np.isfinite(self._tracks[-1][:, 0])
+        moving = surfaces(compared([seen[last] for seen in reversed(self._tracks)]), self._region)
+        if not moving:
+            raise TrackingError(f"nothing moves in {self.frames} frames")
+        part = narrowed(self._region, moving[0])
+        return self._region if part is None else part
 
     def _contrast_now(self) -> float:
         """Standard deviation of the grey levels in the region."""
         return float(self._grays.half[self._region[::2, ::2] > 0].std())
+
+
+def compared(tracks: list[Array]) -> Array:
+    """Tracks (F, P, 2) in frames well spread, most of them early: what is soon covered shows only there how it goes."""
+    chosen = np.unique(((len(tracks) - 1) * np.linspace(0, 1, COMPARED) ** 2).round().astype(int))
+    return np.stack([tracks[k] for k in chosen])
+
+
+def narrowed(region: Image, surface: Surface) -> Image | None:
+    """The part of a region (H, W) uint8 where a surface is; None where hardly anything of it is of something else."""
+    left_out = ~surface.own if region.all() else surface.other  # nobody has chosen a picture's corners
+    return surface.mask if float(left_out.mean()) > LEFT_OUT else None
 
 
 def followed(before: Grays, now: Grays, points_px: Array) -> tuple[Array, Flags]:
@@ -176,7 +196,6 @@ def search(frames: Iterable[Frame], region: Image) -> Found:
     moving = looked.surfaces()
     if not moving:
         return Found(first, region, None, [], looked.frames, narrowed=False)
-    best = moving[0]
-    left_out = ~best.own if region.all() else best.other  # nobody has chosen a picture's corners
-    narrowed = float(left_out.mean()) > LEFT_OUT
-    return Found(first, best.mask if narrowed else region, best, moving[1:], looked.frames, narrowed)
+    part = narrowed(region, moving[0])
+    chosen = region if part is None else part
+    return Found(first, chosen, moving[0], moving[1:], looked.frames, part is not None)

@@ -36,7 +36,7 @@ class Asked:
 
     Attributes:
         expected_px: for each object, by its number, where its points are expected (P, 2); None where nobody knows. One that
-            was not asked for before begins in that frame.
+            was not asked for before is looked for, and begins in that frame or a later one.
         kept: objects that were followed before: what they look like is kept, ...
         sought: ... and one of them is looked for.
     """
@@ -68,8 +68,8 @@ class Seen:
         index: its number in the source.
         time_s: its time there.
         read_s: when it was read, of a live source when it came, as `time.monotonic` tells it.
-        objects: the points of each object asked for; an error where none can begin; of one that is kept if it is sought or
-            was found.
+        objects: the points of each object asked for, unless it is still looked for; an error where none can begin; of one
+            that is kept if it is sought or was found.
         told: what the source has to tell, in words.
         stage_ms: milliseconds it took.
     """

@@ -20,6 +20,7 @@ from tracking import TrackingError
 from tracking.features import detect_corners
 from tracking.guarded import Change, Guarded, GuardedTracker
 from tracking.region.mask import outline, region_mask
+from tracking.region.search import Search
 from tracking.video import Frame, Video
 
 
@@ -49,6 +50,8 @@ class TrackingStage:
             self._told.append(f"points are followed in pictures of {width}x{height} px; --full-size takes all of them")
         self._frames: Iterator[Frame] | None = None
         self._trackers: dict[int, GuardedTracker] = {}
+        self._region: Image | None = None  # where the next object begins, if that is known
+        self._search: Search | None = None  # for that
         self._resting: dict[int, OnDisk[GuardedTracker]] = {}  # of objects that were followed before: 6 MB each
         self._number = 0
 
@@ -77,7 +80,13 @@ class TrackingStage:
         self._trackers = {one: tracker for one, tracker in self._trackers.items() if one in wanted}
         self._resting = {one: tracker for one, tracker in self._resting.items() if one in asked.kept}
         image = self._copy.picture(frame.image)
-        objects = {one: self._object(one, frame.index, image, expected) for one, expected in asked.expected_px.items()}
+        if all(one in self._trackers for one in asked.expected_px):
+            self._search = None
+        objects = {
+            one: found
+            for one, expected in asked.expected_px.items()
+            if (found := self._object(one, frame.index, image, expected)) is not None
+        }
         objects |= {one: found for one in asked.kept if (found := self._earlier(one, image, sought=one == asked.sought))}
         tracked = perf_counter()
         told = tuple(self._told)
@@ -102,8 +111,10 @@ class TrackingStage:
             self._trackers[one] = tracker
         return found
 
-    def _object(self, one: int, index: int, image: Image, expected_px: Array | None) -> Begun | Guarded | TrackingError:
-        """One of the objects in the (copy of the) picture of a frame of that index."""
+    def _object(
+        self, one: int, index: int, image: Image, expected_px: Array | None
+    ) -> Begun | Guarded | TrackingError | None:
+        """One of the objects in the (copy of the) picture of a frame of that index; None while it is looked for."""
         if one in self._trackers:
             expected = None if expected_px is None else self._copy.points(expected_px)
             guarded = self._copy.guarded(self._trackers[one].track(image, expected))
@@ -111,14 +122,33 @@ class TrackingStage:
                 self._told.append(f"frame {index}: {guarded.reason}")
             return guarded
         try:
-            points_px = first_points(self._config, image, self._region, self._copy)
+            region = self._looked_for(image) if self._region is None else self._region
+            if region is None:
+                return None
+            points_px = first_points(self._config, image, region, self._copy)
         except TrackingError as error:
+            self._search = None
             return error
-        begun = Begun(points_px, outline(self._region))
-        given = self._config
-        self._region = region_mask(self.video.size, given.roi, given.mask, given.outline)  # others may be anywhere in it
+        self._region = None
         self._trackers[one] = GuardedTracker(image, self._copy.points(points_px))
-        return begun
+        return Begun(points_px, outline(region))
+
+    def _looked_for(self, image: Image) -> Image | None:
+        """Where in the (copy of the) picture another object is, by what has moved since the first look; None until then.
+
+        Raises:
+            TrackingError: there are too few corners, or nothing moves.
+        """
+        given = self._config
+        region = region_mask(self.video.size, given.roi, given.mask, given.outline)  # it may be anywhere in it
+        if not given.search or given.outline is not None:
+            return region
+        if self._search is None or not self._search.add(image):
+            self._search = Search(image, self._copy.picture(region))
+        if not self._search.enough:
+            return None
+        search, self._search = self._search, None
+        return self._copy.region(search.region_now())
 
 
 def first_points(config: Run, image: Image, region: Image, copy: WorkingCopy) -> Array:

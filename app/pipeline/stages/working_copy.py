@@ -46,6 +46,10 @@ class WorkingCopy:
         """Where points (n, 2) px of the copy are in the picture."""
         return np.asarray((points_px + 0.5) * self.factor - 0.5)
 
+    def region(self, region: Image) -> Image:
+        """A region (H, W) of the copy, of the picture."""
+        return cast(Image, cv2.resize(region, self._size, interpolation=cv2.INTER_NEAREST))
+
     def guarded(self, seen: Guarded) -> Guarded:
         """What the copy shows, in the picture's pixels."""
         observation = seen.observation
@@ -57,10 +61,7 @@ class WorkingCopy:
             return found
         best = None if found.surface is None else self._surface(found.surface)
         others = [self._surface(other) for other in found.others]
-        return replace(found, region=self._region(found.region), surface=best, others=others)
+        return replace(found, region=self.region(found.region), surface=best, others=others)
 
     def _surface(self, surface: Surface) -> Surface:
-        return replace(surface, mask=self._region(surface.mask), motion_px=self.factor * surface.motion_px)
-
-    def _region(self, region: Image) -> Image:
-        return cast(Image, cv2.resize(region, self._size, interpolation=cv2.INTER_NEAREST))
+        return replace(surface, mask=self.region(surface.mask), motion_px=self.factor * surface.motion_px)

@@ -17,7 +17,7 @@ from tests.app.scenes import GOOD, RED, another, run, scenes
 from tests.synthetic_run import verify
 
 A, B = 30, 110  # frames
-AGAIN = 40
+AGAIN = 60
 
 
 @pytest.fixture(autouse=True)
@@ -77,6 +77,7 @@ def test_its_picture_is_painted_on_it_again(film: Path) -> None:
 
 def test_only_so_many_are_kept(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.pipeline.others.MOST_KEPT", 0)
-    monkeypatch.setattr("app.pipeline.successor.AFTER_CUT_S", 0.5)
+    for name in ("AFTER_CUT_S", "AFTER_COVER_S"):
+        monkeypatch.setattr(f"app.pipeline.successor.{name}", 0.5)
     words = run(film / "aba.mp4")
     assert (words["objects"], words["recoveries"], words["own_parts"]) == (3, 0, ("run.rrd",))

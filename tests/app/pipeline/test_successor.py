@@ -27,6 +27,7 @@ from reconstruction.mapping.start import at_once
 from tests.app.command_line import Command, grain, in_own_process, turning
 from tests.app.scenes import FAST, GOOD, RED, another, run, scenes
 from tests.synthetic_run import verify
+from tests.tracking.region.test_search import scene
 from tests.tracking.scene import SIZE, texture
 from tracking import TrackingError
 from tracking.guarded import Guarded, GuardedTracker
@@ -34,6 +35,7 @@ from tracking.video import Video
 
 CUT, FRAMES = 30, 130
 WAIT, SOON = round(30 * AFTER_CUT_S), 15
+SOUGHT = 15  # frames in which it is looked for, at most
 FIRST = 20 + int(FIRST_LATENCY * 20)  # frames until there is a model
 
 
@@ -73,7 +75,7 @@ def test_another_object_gets_a_part_with_a_model_of_its_own(film: Path) -> None:
 
     first, second = (Playback.load(film / name) for name in ("film.rrd", "film-part2.rrd"))
     begun = int(second.frames[0])
-    assert CUT + WAIT + FIRST <= begun <= CUT + WAIT + FIRST + 5
+    assert CUT + WAIT + FIRST <= begun <= CUT + WAIT + FIRST + SOUGHT
     assert [*first.frames, *second.frames] == list(range(FRAMES))
     assert first.shaped.tolist() == [frame < CUT for frame in range(begun)]
     assert set(first.phases[CUT:]) == {"lost"}
@@ -128,6 +130,17 @@ def test_what_stands_still_is_no_object(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
     words = run(scenes(tmp_path / "v.mp4", turning(10), (grain(texture(5), rng) for _ in range(60))))
     assert (words["objects"], words["frames_lost"]) == (1, 60)
+
+
+@pytest.mark.usefixtures("impatient")
+def test_of_another_scene_only_what_moves_is_followed(tmp_path: Path) -> None:
+    after = [frame.image for frame in scene((90, 60, 130, 110, 25.0), frames=90)]
+    words = run(scenes(tmp_path / "v.mp4", turning(10), after), bootstrap_frames=10, tracks_out=Path("t.npz"))
+    assert words["objects"] == 2
+    with np.load("t-object2.npz") as tracks:
+        x, y = tracks["W"][0]
+    inside = (x > 90 - 30) & (x < 220 + 30) & (y > 60 - 5) & (y < 170 + 5)
+    assert inside.mean() > 0.95
 
 
 @pytest.mark.usefixtures("impatient")

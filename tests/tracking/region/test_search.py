@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tests.tracking.scene import texture
 from tracking import TrackingError
 from tracking.features import detect_corners
-from tracking.region.search import MOST_FRAMES, Found, search
+from tracking.region.search import MOST_FRAMES, Found, Search, search
 from tracking.video import Frame, Video
 
 Image = NDArray[np.uint8]
@@ -46,6 +46,23 @@ def test_a_box_before_a_wall_is_found() -> None:
     assert not found.others
     assert overlap(found, 90, 60, 130, 110) > 0.75
     assert found.frames < 40  # it has moved enough by then
+
+
+def test_where_it_is_in_the_last_frame_is_known_too() -> None:
+    frames = list(scene((90, 60, 130, 110, 25.0), frames=25))
+    looked = Search(frames[0].image, WHOLE)
+    assert all(looked.add(frame.image) for frame in frames[1:])
+    region, x = looked.region_now(), 90 + round(25.0 * np.sin(0.05 * 24))
+    truth = np.zeros_like(WHOLE)
+    truth[60:170, x : x + 130] = 255
+    assert ((truth > 0) & (region > 0)).sum() > 0.75 * ((truth > 0) | (region > 0)).sum()
+
+
+def test_where_nothing_moves_no_place_is_told() -> None:
+    looked = Search(texture(1), WHOLE)
+    assert looked.add(texture(1))
+    with pytest.raises(TrackingError, match="nothing moves"):
+        looked.region_now()
 
 
 def test_within_a_loose_region_too() -> None:
