@@ -130,9 +130,15 @@ def read_estimates(rows: Rows, entity: str, frames: Sequence[int], models: Seque
 
 
 def translated(model: Model, before: Model, seen: ShapeEstimate) -> ShapeEstimate:
-    """The estimate that comes nearest to one of a model before, of the same points, at the same place in the image."""
+    """The estimate that comes nearest to one of a model before, of the same points, at the same place in the image.
+
+    Raises:
+        ValueError: it is behind the camera.
+    """
     focal_px = model.camera.focal_px if model.camera.perspective else FAR * model.radius
     origin = np.array([*seen.t, focal_px]) / seen.s
     shape = seen.R @ before.basis.deform(seen.Lambda) + origin[:, None]
     state = model.state_of(shape, focal_px, np.ones(shape.shape[1], np.bool_), None)
+    if state is None:
+        raise ValueError("a shape is behind the camera")
     return model.estimate(seen.frame, seen.projection_px.T, seen.visible, state)

@@ -91,8 +91,8 @@ class Model:
             return np.asarray(R @ self.basis.deform(Lambda) + origin[:, None])
         return np.asarray(s * (R @ self.basis.deform(Lambda)) + np.array([*t, 0.0])[:, None])
 
-    def state_of(self, shape: Array, focal_px: float, seen: Mask, last: State | None) -> State:
-        """Pose and Λ' (n = 1) with which the model comes nearest to a shape.
+    def state_of(self, shape: Array, focal_px: float, seen: Mask, last: State | None) -> State | None:
+        """Pose and Λ' (n = 1) with which the model comes nearest to a shape; None if that is behind the camera.
 
         Args:
             shape: (3, p) in camera axes and units of the rest shape.
@@ -113,6 +113,8 @@ class Model:
             origin = middle - R @ centre
             wanted = R.T @ (said - origin * gram[-1])[:, modes] - gram[:3, modes] + pull * before
             Lambda = np.linalg.solve(gram[modes, modes] + pull * np.eye(r), wanted.T).T
+        if origin[2, 0] <= 0:
+            return None
         s = focal_px / (self.scale * self.radius * origin[2, 0])
         return State(quaternion_from_rotation(R)[None], s * origin[:2].T, np.log([s]), Lambda[None])
 

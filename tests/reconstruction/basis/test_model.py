@@ -100,3 +100,14 @@ def test_coarse_edges_span_the_shape(surface, vertices: int) -> None:  # type: i
     used = min(vertices, POINTS)
     assert used - 1 <= len(edges.length) <= 3 * used - 6
     assert edges.modes.shape == (MODES, len(edges.length))
+
+
+@given(SEEDS)
+def test_a_shape_has_a_state_only_before_the_camera(rng: np.random.Generator) -> None:
+    model, state = model_of(relief(rng, POINTS), PERSPECTIVE, MODES), near_state(rng)
+    seen = np.ones(POINTS, np.bool_)
+    shape = model.estimate(0, np.zeros((2, POINTS)), seen, state).shape
+    found = model.state_of(shape, PERSPECTIVE.focal_px, seen, None)
+    assert found is not None
+    assert np.isfinite(found.log_s).all()
+    assert model.state_of(-shape, PERSPECTIVE.focal_px, seen, None) is None
