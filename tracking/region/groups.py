@@ -12,7 +12,8 @@ NEIGHBOURS = 12  # of a point: enough on its own side of a border between two bo
 STIFFNESS = 0.05  # pull of local maps towards a shift, in units of the neighbours' mean square distance
 ROUNDS = 4  # of re-weighting, so that neighbours on another body do not count
 NOISE_PX = 0.5  # of a point's motion against its neighbours'
-TORN_PX, TORN_SHARE = 1.5, 0.15  # and of how far the nearer end went: farther off, an edge may be torn
+TORN_PX, TORN_SHARE = 1.5, 0.15  # or what is usual, and of how far the nearer end went: farther off, an edge may be torn
+NOISE_SHARE = 1 / 3  # of that
 TORN_OF = 0.75  # of how far its ends moved apart: what bends or stretches carries on, what tears jumps
 FAR = 0.12  # of the picture's larger side: longer edges join nothing
 CORE = 0.6  # of its edges that hold, or a point joins nothing: it may slide along a border
@@ -62,8 +63,9 @@ def groups_of(W: Array, extent_px: float) -> Groups:
     edges = delaunay_edges(W[0])
     edges = edges[np.linalg.norm(W[0][edges[:, 0]] - W[0][edges[:, 1]], axis=1) < FAR * extent_px]
     tear, apart = tear_px(W[0], moved, edges)
-    whole = tear < TORN_OF * (apart + NOISE_PX)
-    parts = firm_parts(edges, tear < TORN_PX + TORN_SHARE * way[edges].min(axis=1), len(way))
+    torn = max(TORN_PX, float(np.median(tear)))  # in blurred pictures points go this way and that
+    whole = tear < TORN_OF * (apart + NOISE_SHARE * torn)
+    parts = firm_parts(edges, tear < torn + TORN_SHARE * way[edges].min(axis=1), len(way))
     whole_parts = joined(absorbed(parts, edges, whole), edges, whole)
     label[often], motion = numbered(whole_parts, way)
     return Groups(label, motion)
