@@ -92,7 +92,8 @@ def notes_on(found: Found, began: int) -> list[str]:
     blank = found.first.index - began
     notes = [f"nothing to follow in the first {blank} frames: begins with frame {found.first.index}"] if blank else []
     if found.surface is None:
-        return [*notes, f"nothing moves in {found.frames} frames: the whole region is taken; choose by --roi X Y W H"]
+        still = f"no surface is seen to move in {found.frames} frames: the whole region is taken; choose by --roi X Y W H"
+        return [*notes, still]
     if not found.narrowed:
         return notes
     note = f"surface found by what moves together in {found.frames} frames: {as_roi(found.surface)}"

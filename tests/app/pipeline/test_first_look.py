@@ -72,7 +72,7 @@ def test_a_still_scene_says_so(tmp_path: Path) -> None:
     with Video(str(path)) as video:
         look = first_look(Run(str(path)), video)
     assert look.region.all()
-    assert look.notes == ["nothing moves in 10 frames: the whole region is taken; choose by --roi X Y W H"]
+    assert look.notes == ["no surface is seen to move in 10 frames: the whole region is taken; choose by --roi X Y W H"]
 
 
 def test_no_more_of_a_live_source_is_kept_than_there_is_memory_for(monkeypatch: pytest.MonkeyPatch) -> None:
