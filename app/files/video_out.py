@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from fractions import Fraction
 from pathlib import Path
@@ -75,12 +76,14 @@ class VideoSink:
         self._stream.codec_context.thread_count = min(8, os.cpu_count() or 1)
         self._begun_s = 0.0
         self._tick = -1  # of the last frame
+        self._encoder = ThreadPoolExecutor(1, "encode")  # meanwhile the next frame is drawn
+        self._encoding: Future[None] | None = None
 
     def write(self, image: Image, time_s: float) -> None:
         """The next frame, (H, W, 3) BGR, which is shown from this time on; the first at the video's begin.
 
         Raises:
-            UsageError: the disk is full.
+            UsageError: the disk is full, perhaps since the frame before.
         """
         assert image.shape[1::-1] == self._size, "a frame of another size"
         if self._tick < 0:
@@ -91,7 +94,8 @@ class VideoSink:
         height, width = self._stream.height, self._stream.width
         frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image[:height, :width]), format="bgr24")
         frame.pts, frame.time_base, self._tick = tick, Fraction(1, TICKS), tick
-        self._put(frame)
+        self._wait()
+        self._encoding = self._encoder.submit(self._put, frame)
 
     def close(self, *, complete: bool = True) -> None:
         """No more frames come.
@@ -100,6 +104,9 @@ class VideoSink:
             UsageError: there was none, or they cannot be written.
         """
         try:
+            with self._encoder:
+                if complete:
+                    self._wait()
             if complete and self._tick >= 0:
                 self._put(None)
             self._file.close()
@@ -108,6 +115,11 @@ class VideoSink:
                 raise self._failure(error) from error
         if complete and self._tick < 0:
             raise UsageError(f"cannot write {self._path}: there is no frame to write")
+
+    def _wait(self) -> None:
+        """Until the frame before is encoded; raises what went wrong with it."""
+        if self._encoding is not None:
+            self._encoding.result()
 
     def _put(self, frame: av.VideoFrame | None) -> None:
         """Encode a frame, or what is left."""
