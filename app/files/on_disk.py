@@ -6,6 +6,8 @@ from io import BytesIO
 from tempfile import TemporaryFile
 from typing import Any, Generic, TypeVar, cast
 
+from app.numbered import Numbered
+
 T = TypeVar("T")
 
 
@@ -20,7 +22,7 @@ class OnDisk(Generic[T]):
         self._shared = shared
         self._parts: list[object] = []
         self._file = TemporaryFile()  # noqa: SIM115 (goes when this object goes)
-        self._places: dict[int, int] = {}  # in the file
+        self._places = Numbered()  # in the file
 
     def add(self, number: int, thing: T) -> None:
         """Keep a thing; another one of that number is forgotten.
@@ -37,18 +39,17 @@ class OnDisk(Generic[T]):
 
     def forget(self, number: int) -> None:
         """It is not wanted any more, if it is there."""
-        self._places.pop(number, None)
+        self._places.forget(number)
 
     def __getitem__(self, number: int) -> T:
-        self._file.seek(self._places[number])
+        self._file.seek(int(self._places[number]))
         unpickler = pickle.Unpickler(self._file)
         unpickler.persistent_load = self._parts.__getitem__  # type: ignore[method-assign]
         return cast(T, unpickler.load())
 
     def taken(self) -> Iterator[tuple[int, T]]:
-        """All that are left, in the order in which their numbers came; each is forgotten."""
-        while self._places:
-            number = next(iter(self._places))
+        """All that are left, by their numbers; each is forgotten."""
+        for number in self._places:
             yield number, self[number]
             self.forget(number)
 

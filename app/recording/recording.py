@@ -15,6 +15,7 @@ import rerun as rr
 from app.arrays import Array, Image, Indices
 from app.files.on_disk import OnDisk
 from app.files.writing import check_free
+from app.numbered import Numbered
 from app.recording import entities
 from app.recording.columns import Values, ours
 from app.recording.drawing import Shape, Tint, draw
@@ -77,7 +78,7 @@ class Recording:
         self._estimates = (entities.ESTIMATE, entities.ONLINE) if keep_online else (entities.ESTIMATE,)
         self._size, self._image, self._color = size, image, color
         self._video_ns: Indices = np.empty(0, np.int64)
-        self._frames, self._models, self._times = 0, 0, dict[int, float]()
+        self._frames, self._models, self._times = 0, 0, Numbered()
         self._last_seen: Array = NOWHERE
         self._without_shape: set[int] = set()  # frames that said so
         self._model: Model | None = None
@@ -208,9 +209,7 @@ class Recording:
 
     def truth(self, shapes: Mapping[int, Array]) -> None:
         """True points (n, 3) of some frames, where the shapes are; those of frames that are in other files are left out."""
-        for index, true in shapes.items():
-            if index not in self._times:
-                continue
+        for index, true in ((index, true) for index, true in shapes.items() if index in self._times):
             with self._stream.frame(index, self._times[index]):
                 self._stream.row(entities.TRUTH, rr.Points3D.columns, **points(true, SEEN_RGB, -1.5))
 
