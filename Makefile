@@ -49,7 +49,8 @@ wheel: .venv/ready
 	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
 	$(PYTHON) -m venv .venv-wheel
 	PIP_CONSTRAINT=constraints.txt .venv-wheel/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
-	cd "$$(mktemp -d)" && "$(CURDIR)/.venv-wheel/bin/modeshape" demo --json
+	mkdir .venv-wheel/empty && cd .venv-wheel/empty && ../bin/modeshape demo --json
+	rm -rf .venv-wheel
 
 # Those of the README, in docs/.
 pictures: demo
@@ -62,11 +63,12 @@ pictures: demo
 	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	touch $@
 
-.venv-opencv4/ready: pyproject.toml constraints.txt
+# Everything but OpenCV is that of .venv.
+.venv-opencv4/ready: .venv/ready
 	$(PYTHON) -m venv .venv-opencv4
-	sed 's/^\(opencv-contrib-python-headless\)==.*/\1==$(OPENCV4)/' constraints.txt > .venv-opencv4/constraints.txt
-	PIP_CONSTRAINT=.venv-opencv4/constraints.txt \
-	    $(BIN4)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(BIN4)/python -m pip install --quiet --disable-pip-version-check --no-deps opencv-contrib-python-headless==$(OPENCV4)
+	$(BIN)/python -c 'import sysconfig; print("import site; site.addsitedir(", repr(sysconfig.get_path("purelib")), ")", sep="")' \
+	    > "$$($(BIN4)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/venv.pth"
 	touch $@
 
 clean:

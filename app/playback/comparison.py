@@ -1,5 +1,8 @@
 """Showing recordings in a viewer: one as it was recorded, two side by side."""
 
+from pathlib import Path
+from tempfile import NamedTemporaryFile
+
 import rerun as rr
 import rerun.blueprint as rrb
 from rerun.chunk import Chunk
@@ -25,9 +28,10 @@ def show(reviewed: list[Reviewed], url: str) -> None:
     stream.send_recording_name(" | ".join(one.label for one in reviewed))
     try:
         for one, side in zip(reviewed, SIDES, strict=False):
-            for chunk in ChunkFile(one.playback.path):
-                if not chunk.entity_path.startswith("/__"):  # properties, as the name
-                    rr.send_chunks(below(side, chunk) if two else chunk, recording=stream)
+            with NamedTemporaryFile(suffix=".rrd") as part:
+                for chunk in ChunkFile(one.playback.path, Path(part.name)):
+                    if not chunk.entity_path.startswith("/__"):  # properties, as the name
+                        rr.send_chunks(below(side, chunk) if two else chunk, recording=stream)
             if two:
                 name_curves(stream, one, side)
         stream.flush()

@@ -4,7 +4,6 @@ import struct
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
-from tempfile import NamedTemporaryFile
 from typing import BinaryIO
 
 import numpy as np
@@ -25,9 +24,14 @@ LAST_KIND = 3
 
 
 class ChunkFile:
-    """A `RecordingFile` that is read in this process; an iterable of its chunks, which are read one at a time."""
+    """A `RecordingFile` that is read in this process; an iterable of its chunks, which are read one at a time.
 
-    def __init__(self, path: Path) -> None:
+    Args:
+        path: the .rrd file.
+        part: where the complete messages of a file that ends in the middle of one are copied to.
+    """
+
+    def __init__(self, path: Path, part: Path) -> None:
         self.path = path
         self.cut_off = False
         if not path.is_file():
@@ -38,13 +42,13 @@ class ChunkFile:
         try:
             self._open(path)
         except RuntimeError:
-            self._open_complete_part()
+            self._open_complete_part(part)
 
     def __iter__(self) -> Iterator[Chunk]:
         try:
             yield from self._reader.stream(store=self._store)
         except RuntimeError as error:
-            raise UsageError(f"{self.path} is damaged ({error}): run again to make another") from error
+            raise self._damaged(error) from error
 
     def pieces(self, *wanted: Wanted) -> Iterator[tuple[str, str, list[Row]]]:
         """Entity, component and rows of all wanted components; entities are named without a leading slash."""
@@ -76,24 +80,25 @@ class ChunkFile:
             "give an .rrd file that `modeshape run` wrote"
         )
 
-    def _open_complete_part(self) -> None:
+    def _open_complete_part(self, part: Path) -> None:
         """Read the complete messages of a file that ends in the middle of one, from a copy."""
-        self._part = NamedTemporaryFile(suffix=".rrd")  # noqa: SIM115 (goes when this object goes)
         try:
-            with self.path.open("rb") as source:
+            with self.path.open("rb") as source, part.open("wb") as copy:
                 left = complete_bytes(source, self.path.stat().st_size)
                 source.seek(0)
                 while block := source.read(min(left, 2**20)):
-                    self._part.write(block)
+                    copy.write(block)
                     left -= len(block)
-            self._part.flush()
         except OSError as error:
             raise UsageError(f"cannot read {self.path}: {error.strerror}") from error
         try:
-            self._open(Path(self._part.name))
+            self._open(part)
         except RuntimeError as error:
-            raise UsageError(f"{self.path} is damaged ({error}): run again to make another") from error
+            raise self._damaged(error) from error
         self.cut_off = True
+
+    def _damaged(self, error: RuntimeError) -> UsageError:
+        return UsageError(f"{self.path} is damaged ({error}): run again to make another")
 
 
 def complete_bytes(file: BinaryIO, size: int) -> int:

@@ -6,7 +6,8 @@ import weakref
 from collections.abc import Iterator
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from tempfile import NamedTemporaryFile
+from typing import IO, Any
 
 from app.playback.reading.rows import Row, Rows, Wanted
 from app.processes.child import child, connection_to_parent
@@ -66,9 +67,10 @@ class Reader:
 
     def __init__(self, path: Path) -> None:
         self._path = path
+        part = NamedTemporaryFile(suffix=".rrd")  # noqa: SIM115 (here, since it must go however the process ends)
         process, self._connection = child("app.playback.reading.file")
-        self.end = weakref.finalize(self, ended, process, self._connection)
-        self.ask(path)
+        self.end = weakref.finalize(self, ended, process, self._connection, part)
+        self.ask((path, Path(part.name)))
 
     def ask(self, message: object) -> None:
         """Send a message; answers may be many."""
@@ -97,11 +99,12 @@ class Reader:
         return UsageError(f"{self._path} is damaged ({why}): run again to make another")
 
 
-def ended(process: Any, connection: Connection) -> None:
+def ended(process: Any, connection: Connection, part: IO[bytes]) -> None:
     """End a reader."""
     connection.close()
     process.kill()
     process.wait()
+    part.close()
 
 
 def main() -> None:
@@ -111,9 +114,9 @@ def main() -> None:
     connection = connection_to_parent()
     resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, resource.getrlimit(resource.RLIMIT_AS)[1]))
     try:
-        path = connection.recv()
+        path, part = connection.recv()
         try:
-            file = ChunkFile(path)
+            file = ChunkFile(path, part)
             connection.send(file.cut_off)
             while True:
                 wanted = connection.recv()

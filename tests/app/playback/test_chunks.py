@@ -1,6 +1,7 @@
 """Files that are cut off, damaged, or no recording."""
 
 import contextlib
+import gc
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,9 @@ def long_recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_run(tmp_path_factory.mktemp("long") / "long.rrd", frames=250).path
 
 
-def test_file_that_is_cut_off(tmp_path: Path, long_recording: Path) -> None:
+def test_file_that_is_cut_off(tmp_path: Path, long_recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
     whole = long_recording.read_bytes()
     path = tmp_path / "cut.rrd"
     with long_recording.open("rb") as file:
@@ -38,6 +41,9 @@ def test_file_that_is_cut_off(tmp_path: Path, long_recording: Path) -> None:
     assert both.sum() > 50
     assert np.array_equal(playback.shapes()[both], complete.shapes()[:count][both])
     assert path.read_bytes() == before
+    del playback, complete
+    gc.collect()
+    assert not list((tmp_path / "temporary").iterdir()), "copies are left behind"
 
 
 @settings(max_examples=12)
