@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
@@ -18,6 +19,7 @@ SWEEPS = 3  # more with all functions, the last with all points
 FEW = 250  # well-spread points that are enough to tell gross errors
 FEW_FUNCTIONS = 40  # where bending is held firmly
 ENOUGH = 0.8  # of them that must be seen
+FULL = 0.9  # of the points of the image that shows most: as good as all
 TRIED = 8  # images by which the weight of bending is found
 FIRM = 10.0 ** np.arange(-7, 1.5, 0.5)  # weights of bending that are tried
 GROSS = 8.0  # times the usual residual: not the same point
@@ -121,24 +123,42 @@ def fitted(warps: Warps, W: Array, visible: Mask, firmness: float) -> Warps:
 
 
 def reference_image(W: Array, visible: Mask) -> Array:
-    """One image (2, p) px of all points: the median of what every image, warped on to the fullest one, says.
+    """One image (2, p) px of all points: the median of what every image, warped on to the clearest one, says.
 
     NaN for points that no image shows.
     """
-    fullest = int(visible.sum(axis=1).argmax())
+    clearest = clearest_image(W, visible)
     said = np.full((len(W), 2, W.shape[2]), np.nan)
     for f, (w, h) in enumerate(zip(W, visible, strict=True)):
-        both = np.flatnonzero(h & visible[fullest])
-        if f == fullest or len(both) < 2 * ROUGH_FUNCTIONS:
-            said[f][:, h] = w[:, h] if f == fullest else np.nan
+        both = np.flatnonzero(h & visible[clearest])
+        if f == clearest or len(both) < 2 * ROUGH_FUNCTIONS:
+            said[f][:, h] = w[:, h] if f == clearest else np.nan
             continue
         nodes = both[farthest_points(w[:, both].T, ROUGH_NODES)]
         field = smooth_field(w[:, nodes], ROUGH_FUNCTIONS)
         B = field.at(w[:, h])
-        target = W[fullest][:, h]
-        c = robust_fit(B, target, visible[fullest][h], field.stiffness, 1e-3)[0]
+        target = W[clearest][:, h]
+        c = robust_fit(B, target, visible[clearest][h], field.stiffness, 1e-3)[0]
         said[f][:, h] = (B @ c).T
     return median(said)
+
+
+def clearest_image(W: Array, visible: Mask) -> int:
+    """Of the images that show most points, the one in which they lie farthest from each other.
+
+    What is seen there from the side or folded over is no function of it in any other image.
+    """
+    count = visible.sum(axis=1)
+    full = np.flatnonzero(count >= FULL * count.max())
+    fullest = int(count.argmax())
+    few = np.flatnonzero(visible[fullest])
+    few = few[farthest_points(W[fullest][:, few].T, FEW)]
+    apart = []
+    for f in full:
+        place = W[f][:, few[visible[f, few]]].T
+        nearest = cKDTree(place).query(place, k=2)[0][:, 1]
+        apart.append(np.log(nearest.clip(1e-12)).mean())
+    return int(full[np.argmax(apart)])
 
 
 def spread_rows(seen: Mask, few: Indices) -> Indices:
