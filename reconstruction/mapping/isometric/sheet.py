@@ -11,8 +11,9 @@ from reconstruction.mapping.isometric.bundle import FUNCTIONS, Lengths, data_nor
 from reconstruction.mapping.isometric.convex import convex_finish
 from reconstruction.mapping.isometric.lengths import best_start
 from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, rays_of
+from reconstruction.mapping.isometric.robust_fit import ENOUGH
 from reconstruction.mapping.isometric.smooth_field import SmoothField
-from reconstruction.mapping.isometric.warps import ENOUGH, Warps, quick_fit
+from reconstruction.mapping.isometric.warps import Warps, quick_fit
 
 STEPS = 2  # of depths: they are only the start
 HELD = 0.03  # of the image's RMS radius: how far a point that is not seen may be off where its neighbours put it

@@ -3,28 +3,28 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
+from reconstruction.mapping.isometric.reference import reference_image
+from reconstruction.mapping.isometric.robust_fit import (
+    FEW_FUNCTIONS,
+    FINEST,
+    ROUGH_SWEEPS,
+    robust_fit,
+    spread_rows,
+    weighted_fit,
+    weights_of,
+)
 from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
 from reconstruction.mapping.outliers import without_outliers
 
 FUNCTIONS = 100  # of the field that an image is made of
-ROUGH_FUNCTIONS = 20  # of the one that only says where a point would be in the reference image
 NODES = 200
-ROUGH_NODES = 50
-ROUGH_SWEEPS = 4  # of re-weighting, with few functions and few points
-SWEEPS = 3  # more with all functions, the last with all points
 FEW = 250  # well-spread points that are enough to tell gross errors
-FEW_FUNCTIONS = 40  # where bending is held firmly
-ENOUGH = 0.8  # of them that must be seen
-FULL = 0.9  # of the points of the image that shows most: as good as all
 TRIED = 8  # images by which the weight of bending is found
 FIRM = 10.0 ** np.arange(-7, 1.5, 0.5)  # weights of bending that are tried
-GROSS = 8.0  # times the usual residual: not the same point
 FIRST_FIRMNESS = 1e-5
-FINEST = 1e-4  # of the image's RMS radius: no residual is usually smaller
 
 
 @dataclass(frozen=True)
@@ -122,83 +122,6 @@ def fitted(warps: Warps, W: Array, visible: Mask, firmness: float) -> Warps:
     return replace(warps, coefficients=coefficients, weights=weights, inlier=inlier, noise_px=noise, firmness=firmness)
 
 
-def reference_image(W: Array, visible: Mask) -> Array:
-    """One image (2, p) px of all points: the median of what every image, warped on to the clearest one, says.
-
-    NaN for points that no image shows.
-    """
-    clearest = clearest_image(W, visible)
-    said = np.full((len(W), 2, W.shape[2]), np.nan)
-    for f, (w, h) in enumerate(zip(W, visible, strict=True)):
-        both = np.flatnonzero(h & visible[clearest])
-        if f == clearest or len(both) < 2 * ROUGH_FUNCTIONS:
-            said[f][:, h] = w[:, h] if f == clearest else np.nan
-            continue
-        nodes = both[farthest_points(w[:, both].T, ROUGH_NODES)]
-        field = smooth_field(w[:, nodes], ROUGH_FUNCTIONS)
-        B = field.at(w[:, h])
-        target = W[clearest][:, h]
-        c = robust_fit(B, target, visible[clearest][h], field.stiffness, 1e-3)[0]
-        said[f][:, h] = (B @ c).T
-    return median(said)
-
-
-def clearest_image(W: Array, visible: Mask) -> int:
-    """Of the images that show most points, the one in which they lie farthest from each other.
-
-    What is seen there from the side or folded over is no function of it in any other image.
-    """
-    count = visible.sum(axis=1)
-    full = np.flatnonzero(count >= FULL * count.max())
-    fullest = int(count.argmax())
-    few = np.flatnonzero(visible[fullest])
-    few = few[farthest_points(W[fullest][:, few].T, FEW)]
-    apart = []
-    for f in full:
-        place = W[f][:, few[visible[f, few]]].T
-        nearest = cKDTree(place).query(place, k=2)[0][:, 1]
-        apart.append(np.log(nearest.clip(1e-12)).mean())
-    return int(full[np.argmax(apart)])
-
-
-def spread_rows(seen: Mask, few: Indices) -> Indices:
-    """Well-spread points among those seen (p,): of the few if there are enough of them, else all."""
-    rows = few[seen[few]]
-    return rows if len(rows) > ENOUGH * len(few) else np.flatnonzero(seen)
-
-
-def robust_fit(
-    B: Array, w: Array, seen: Mask, stiffness: Array, firmness: float, few: Indices | None = None
-) -> tuple[Array, Array, Mask, float]:
-    """Smooth function through image points w (2, p), Geman-McClure weights, B (p, r) the functions at the points.
-
-    Gross errors must not bend it: it is stiff at first, and made of the first functions and of the few points only.
-
-    Returns:
-        coefficients (r, 2), weights (p,), inliers (p,), usual residual of a coordinate.
-    """
-    every = np.flatnonzero(seen)
-    some = every if few is None else spread_rows(seen, few)
-    finest = FINEST * float(np.sqrt(np.var(w[:, some], axis=1).sum()))
-    h, done, c = np.ones(len(some)), 0, np.zeros((0, 2))
-    for rows, r, sweeps in (
-        (some, FEW_FUNCTIONS, ROUGH_SWEEPS),
-        (some, len(stiffness), SWEEPS - 1),
-        (every, len(stiffness), 1),
-    ):
-        Bs, ws = B[rows, :r], w[:, rows].T
-        if done:
-            h = weights_of(ws - Bs[:, : len(c)] @ c, finest)[0]
-        for _ in range(sweeps):
-            done += 1
-            firm = max(firmness, 10.0**-done)
-            c, _ = weighted_fit(Bs, ws, h, firm * stiffness[:r])
-            h, off, usual = weights_of(ws - Bs @ c, finest)
-    weights, inlier = np.zeros(len(B)), np.zeros(len(B), bool)
-    weights[every], inlier[every] = h, off < GROSS * usual
-    return c, weights, inlier, usual
-
-
 def quick_fit(warps: Warps, w: Array, visible: Mask, points: Indices) -> tuple[Array, Array, Array]:
     """One more image w (2, p) px made smooth: as `robust_fit` does, but by the few points only.
 
@@ -221,21 +144,6 @@ def quick_fit(warps: Warps, w: Array, visible: Mask, points: Indices) -> tuple[A
     return image.T, usual**2 / h.sum() * ((at @ np.linalg.inv(gram)) * at).sum(axis=1), weights
 
 
-def weighted_fit(B: Array, target: Array, h: Array, held: Array) -> tuple[Array, Array]:
-    """Coefficients (r, 2) of functions B (n, r) through a target (n, 2) weighted by h, held back; and the normal matrix."""
-    weighted = B.T * (h / h.sum())
-    gram = weighted @ B
-    gram[np.diag_indices(len(gram))] += held + 1e-12
-    return np.linalg.solve(gram, weighted @ target), gram
-
-
-def weights_of(residual: Array, finest: float) -> tuple[Array, Array, float]:
-    """Geman-McClure weights (n,) of residuals (n, 2), their lengths (n,), and the usual residual of a coordinate."""
-    off = np.sqrt((residual**2).sum(axis=1))
-    usual = max(float(np.partition(off, len(off) // 2)[len(off) // 2]) / 1.1774, finest)  # of a Rayleigh distribution
-    return 1 / (1 + (off / (GROSS * usual)) ** 2) ** 2, off, usual
-
-
 def cross_validated(B: Array, W: Array, weights: Array, stiffness: Array) -> float:
     """Weight of bending that predicts left-out points of all images best: generalised cross validation."""
     score = np.zeros(len(FIRM))
@@ -251,12 +159,3 @@ def cross_validated(B: Array, W: Array, weights: Array, stiffness: Array) -> flo
         counts[0] += hs.sum()
         counts[1] += (inverse * gram).sum(axis=(1, 2))
     return float(FIRM[np.argmin(score / counts[0] / (1 - counts[1] / counts[0]).clip(1e-3) ** 2)])
-
-
-def median(values: Array) -> Array:
-    """Median over the first axis of values (F, ...) without NaN; NaN where there is none."""
-    ordered = np.sort(values, axis=0)
-    n = np.isfinite(ordered).sum(axis=0)
-    low, high = np.maximum(n - 1, 0) // 2, np.minimum(n // 2, len(values) - 1)
-    picked = [np.take_along_axis(ordered, k[None], axis=0)[0] for k in (low, high)]
-    return np.asarray(np.where(n > 0, (picked[0] + picked[1]) / 2, np.nan))

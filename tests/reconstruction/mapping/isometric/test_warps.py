@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from reconstruction.mapping.isometric.reference import clearest_image, median, reference_image
 from reconstruction.mapping.isometric.smooth_field import smooth_field
-from reconstruction.mapping.isometric.warps import median, reference_image, smooth_warps
+from reconstruction.mapping.isometric.warps import smooth_warps
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 
 
@@ -21,10 +22,22 @@ def test_points_missing_in_the_reference_image_are_placed_by_the_others() -> Non
     rng = np.random.default_rng(2)
     W, _ = waving_sheet(rng, points=250, amplitude=0.3, noise_px=0.0)
     visible = rng.random((12, 250)) > 0.4
-    fullest = visible.sum(axis=1).argmax()
-    reference = reference_image(np.where(visible[:, None], W, np.nan), visible)
+    W_seen = np.where(visible[:, None], W, np.nan)
+    reference = reference_image(W_seen, visible)
     assert np.isfinite(reference).all()
-    assert np.median(np.linalg.norm(reference - W[fullest], axis=0)) < 2.0
+    assert np.median(np.linalg.norm(reference - W[clearest_image(W_seen, visible)], axis=0)) < 2.0
+
+
+def test_an_image_of_the_surface_from_the_side_is_no_reference() -> None:
+    W, _ = waving_sheet(np.random.default_rng(5), points=250, amplitude=0.3)
+    first = W[0].copy()
+    right = first[0] > np.median(first[0])
+    first[0, right] = np.median(first[0]) - 0.3 * (first[0, right] - np.median(first[0]))  # folded over
+    W = np.concatenate([first[None], W])
+    visible = np.ones((13, 250), bool)
+    assert clearest_image(W, visible) != 0
+    warps = smooth_warps(W, visible)
+    assert np.median(np.linalg.norm(warps.images() - W, axis=1)) < 1.0
 
 
 def test_what_is_far_from_all_visible_points_is_uncertain() -> None:

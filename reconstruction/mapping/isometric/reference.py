@@ -1,0 +1,63 @@
+"""The image of a bending sheet that all others are smooth functions of."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis.mesh import farthest_points
+from reconstruction.mapping.isometric.robust_fit import robust_fit
+from reconstruction.mapping.isometric.smooth_field import smooth_field
+
+FUNCTIONS = 20  # of a field that only says where a point would be in the reference image
+NODES = 50
+FIRMNESS = 1e-3
+COMPARED = 250  # well-spread points
+FULL = 0.9  # of the points of the image that shows most: as good as all
+
+
+def reference_image(W: Array, visible: Mask) -> Array:
+    """One image (2, p) px of all points: the median of what every image, warped on to the clearest one, says.
+
+    NaN for points that no image shows.
+    """
+    clearest = clearest_image(W, visible)
+    said = np.full((len(W), 2, W.shape[2]), np.nan)
+    for f, (w, h) in enumerate(zip(W, visible, strict=True)):
+        both = np.flatnonzero(h & visible[clearest])
+        if f == clearest or len(both) < 2 * FUNCTIONS:
+            said[f][:, h] = w[:, h] if f == clearest else np.nan
+            continue
+        nodes = both[farthest_points(w[:, both].T, NODES)]
+        field = smooth_field(w[:, nodes], FUNCTIONS)
+        B = field.at(w[:, h])
+        target = W[clearest][:, h]
+        c = robust_fit(B, target, visible[clearest][h], field.stiffness, FIRMNESS)[0]
+        said[f][:, h] = (B @ c).T
+    return median(said)
+
+
+def clearest_image(W: Array, visible: Mask) -> int:
+    """Of the images that show most points, the one in which they lie farthest from each other.
+
+    What is seen there from the side or folded over is no function of it in any other image.
+    """
+    count = visible.sum(axis=1)
+    full = np.flatnonzero(count >= FULL * count.max())
+    fullest = int(count.argmax())
+    few = np.flatnonzero(visible[fullest])
+    few = few[farthest_points(W[fullest][:, few].T, COMPARED)]
+    apart = []
+    for f in full:
+        place = W[f][:, few[visible[f, few]]].T
+        nearest = np.asarray(cKDTree(place).query(place, k=2)[0])[:, 1]
+        apart.append(np.log(nearest.clip(1e-12)).mean())
+    return int(full[np.argmax(apart)])
+
+
+def median(values: Array) -> Array:
+    """Median over the first axis of values (F, ...) without NaN; NaN where there is none."""
+    ordered = np.sort(values, axis=0)
+    n = np.isfinite(ordered).sum(axis=0)
+    low, high = np.maximum(n - 1, 0) // 2, np.minimum(n // 2, len(values) - 1)
+    picked = [np.take_along_axis(ordered, k[None], axis=0)[0] for k in (low, high)]
+    return np.asarray(np.where(n > 0, (picked[0] + picked[1]) / 2, np.nan))
