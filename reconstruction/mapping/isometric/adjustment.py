@@ -32,6 +32,9 @@ FUNCTIONS = 40
 START_FRAMES = 10  # of the convex start
 BUNDLE_ROUNDS = 8  # of shapes, then places and lengths: with much noise they are still getting better
 FEW_ROUNDS = 2  # bring most of that in a tenth of a second
+ROUGH_ROUNDS = 2  # in which lengths lose their noise; after those, they go on the way they went
+GOING_ON = 0.7  # of the way of the round before: alone, each round goes a part of it only
+SETTLED = 2e-4  # of the shapes' size: a round that moves them less is the last
 ROUNDS = 6  # at most, of starting frames again that do not fit
 OTHER_STARTS = 2
 FIRM_START = 100.0  # times the bending weight, before it is let go
@@ -112,15 +115,18 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
     """
     weights = found.warps.weights * found.warps.inlier / found.warps.noise_px[:, None] ** 2
     W, shapes, placed = np.where(weights[:, None] > 0, W, 0.0), found.shapes(), found.warps.placed
-    rays = rays_of(W, found.camera)[:, :2, placed]
-    for _ in range(rounds):
+    rays, way = rays_of(W, found.camera)[:, :2, placed], np.zeros(len(found.log_lengths))
+    for k in range(rounds):
         C = found.bundled(shapes, W, weights)
         places = found.warps.reference.copy()
         slopes = found.warps.field.slopes_at(places[:, placed])[:, : C.shape[2]]
         places[:, placed] += places_moved(C, rays, weights[:, placed], found.functions[placed], slopes)
         found = found.moved(places)
-        found = replace(found, log_lengths=np.median(found.lengths.now(C)[1], axis=0))
-        shapes = C @ found.functions.T
+        way = (GOING_ON * way if k >= ROUGH_ROUNDS else 0.0) + np.median(found.lengths.now(C)[1], axis=0) - found.log_lengths
+        found = replace(found, log_lengths=found.log_lengths + way)
+        before, shapes = shapes, C @ found.functions.T
+        if np.sqrt(np.nanmean((shapes - before) ** 2)) < SETTLED * np.nanstd(before):
+            break
     return found.with_shapes(shapes)
 
 
