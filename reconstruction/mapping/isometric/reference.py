@@ -9,6 +9,7 @@ from reconstruction.mapping.isometric.robust_fit import robust_fit
 from reconstruction.mapping.isometric.smooth_field import smooth_field
 
 FUNCTIONS = 20  # of a field that only says where a point would be in the reference image
+FEWEST = 6  # where images have few points in common
 NODES = 50
 FIRMNESS = 1e-3
 COMPARED = 250  # well-spread points
@@ -21,17 +22,26 @@ def reference_image(W: Array, visible: Mask) -> Array:
     NaN for points that no image shows.
     """
     clearest = clearest_image(W, visible)
+    reference = np.where(visible[clearest], W[clearest], np.nan)
+    if np.median((visible & visible[clearest]).sum(axis=1)) < 2 * FUNCTIONS:  # roughly first, and so all points
+        reference = placed(W, visible, reference, FEWEST)
+    return placed(W, visible, reference, FUNCTIONS)
+
+
+def placed(W: Array, visible: Mask, reference: Array, functions: int) -> Array:
+    """What every image, warped on to a reference image (2, p), says in the median; NaN for points that none shows.
+
+    An image counts that has in common with it twice as many points as the least number of functions.
+    """
     said = np.full((len(W), 2, W.shape[2]), np.nan)
     for f, (w, h) in enumerate(zip(W, visible, strict=True)):
-        both = np.flatnonzero(h & visible[clearest])
-        if f == clearest or len(both) < 2 * FUNCTIONS:
-            said[f][:, h] = w[:, h] if f == clearest else np.nan
+        both = np.flatnonzero(h & np.isfinite(reference[0]))
+        if len(both) < 2 * functions:
             continue
         nodes = both[farthest_points(w[:, both].T, NODES)]
-        field = smooth_field(w[:, nodes], FUNCTIONS)
-        B = field.at(w[:, h])
-        target = W[clearest][:, h]
-        c = robust_fit(B, target, visible[clearest][h], field.stiffness, FIRMNESS)[0]
+        field = smooth_field(w[:, nodes], min(FUNCTIONS, len(both) // 2))
+        B, known = field.at(w[:, h]), np.isfinite(reference[0, h])
+        c = robust_fit(B, reference[:, h], known, field.stiffness, FIRMNESS)[0]
         said[f][:, h] = (B @ c).T
     return median(said)
 
