@@ -6,7 +6,7 @@ from reconstruction.arrays import Array, Indices, Mask
 
 KEYFRAMES = 30
 FEWEST_SHARED = 12  # points that two frames must share to be compared
-FEWEST_SEEN = 0.25  # of the points a frame must show
+FEWEST_SEEN = 0.25  # of the points that another frame showed it must show
 SWEEPS = 3  # of re-weighting, against gross errors
 TINY = 1e-12  # squared difference, relative, that counts as none
 
@@ -33,6 +33,7 @@ class Keyframes:
         self._W: list[Array] = []
         self._visible: list[Mask] = []
         self._apart = np.zeros((0, 0))
+        self._most = 0  # points that any frame offered showed
         self._alike = 0  # place of the keyframe most like the last frame that was compared with all
 
     @property
@@ -42,7 +43,9 @@ class Keyframes:
 
     def offer(self, frame: int, W: Array, visible: Mask) -> bool:
         """Take a frame's points (2, p) px with visibility (p,), if they differ from those there are; whether it was."""
-        if visible.mean() < FEWEST_SEEN:
+        seen = int(visible.sum())
+        self._most = max(self._most, seen)
+        if seen < max(FEWEST_SHARED, FEWEST_SEEN * self._most):
             return False
         W, n = np.where(visible, W, 0.0), len(self.frames)
         least = nearest_pair(self._apart)[2] if n >= self.capacity else -1.0

@@ -118,7 +118,7 @@ class Mapper:
 
     def final(self, camera: Camera) -> Map | None:
         """The map of the keyframes of all frames, posed first as in the first frame; None if they do not tell."""
-        if self._keyframes is None:
+        if self._keyframes is None or not self._keyframes.frames:
             return None
         W, visible, _ = self._keyframes.spread()
         known = self._settings.estimate_focal, self._known, self.start, self._given

@@ -122,7 +122,7 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
         slopes = found.warps.field.slopes_at(places[:, placed])[:, : C.shape[2]]
         places[:, placed] += places_moved(C, rays, weights[:, placed], found.functions[placed], slopes)
         found = found.moved(places)
-        way = GOING_ON * way if k >= ROUGH_ROUNDS else 0.0
+        way = GOING_ON * way if k >= ROUGH_ROUNDS else 0 * way
         way = way + np.median(found.lengths.now(C)[1], axis=0) - found.log_lengths
         found = replace(found, log_lengths=found.log_lengths + way)
         before, shapes = shapes, C @ found.functions.T

@@ -29,7 +29,7 @@ def reference_image(W: Array, visible: Mask) -> Array:
 
 
 def placed(W: Array, visible: Mask, reference: Array, functions: int) -> Array:
-    """What every image, warped on to a reference image (2, p), says in the median; NaN for points that none shows.
+    """What every image, warped on to a reference image (2, p), says in the median; as it is for points that none tells of.
 
     An image counts that has in common with it twice as many points as the least number of functions.
     """
@@ -43,7 +43,8 @@ def placed(W: Array, visible: Mask, reference: Array, functions: int) -> Array:
         B, known = field.at(w[:, h]), np.isfinite(reference[0, h])
         c = robust_fit(B, reference[:, h], known, field.stiffness, FIRMNESS)[0]
         said[f][:, h] = (B @ c).T
-    return median(said)
+    found = median(said)
+    return np.where(np.isfinite(found), found, reference)
 
 
 def clearest_image(W: Array, visible: Mask) -> int:

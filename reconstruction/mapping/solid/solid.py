@@ -15,7 +15,7 @@ from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.adjustment import Adjustment, adjust
 from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior, off_plane, scaled
 from reconstruction.mapping.solid.spikes import smoothed
-from reconstruction.mapping.solid.views import building_order, completed, likeness
+from reconstruction.mapping.solid.views import building_order, completed, likeness, with_unseen
 from reconstruction.window.robust import deviation
 
 FEWEST_VIEWS, FEWEST_POINTS = 3, 6
@@ -113,7 +113,9 @@ def bundle_adjust(
         found = sorted([*found, build.reversed(found[0][0], kappa, refine=refine_focal)], key=lambda one: one[1])
     bundle = scaled(found[0][0], unit)
     back = np.argsort(order)
-    bundle = Bundle(replace(bundle[back].motion).in_first_frame(), bundle.kappa)
+    motion = bundle[back].motion.in_first_frame()
+    motion = replace(motion, shape=with_unseen(motion.shape, np.asarray(visible.any(axis=0)), known))
+    bundle = Bundle(motion, bundle.kappa)
     return describe(W, given, bundle, camera, (found[0][1], found[1][1] if kappa else found[0][1]))
 
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
+from reconstruction.camera import nearest_rotation
 from reconstruction.mapping.outliers import medians
 
 COMPARED = 120  # points: enough to tell views apart
@@ -77,6 +78,24 @@ def completed(W: Array, visible: Mask, alike: Likeness, view: int) -> Array:
     best = np.where(np.isfinite(near.real), near, far)
     best = np.where(np.isfinite(best.real), best, np.nanmean(best))
     return np.stack([best.real, best.imag])
+
+
+def with_unseen(shape: Array, seen: Mask, known: Array | None) -> Array:
+    """A shape (3, p), points that no view shows where a known one (3, p), laid on to it, has them; without in its middle.
+
+    Args:
+        shape: as above.
+        seen: (p,) whether any view shows a point.
+        known: of any size, turned anyhow.
+    """
+    whole, middle = shape.copy(), shape[:, seen].mean(axis=1, keepdims=True)
+    whole[:, ~seen] = middle
+    if known is not None and not seen.all():
+        known = known - known[:, seen].mean(axis=1, keepdims=True)
+        M = (shape - middle)[:, seen] @ known[:, seen].T
+        R = nearest_rotation(M)
+        whole[:, ~seen] += float((R * M).sum() / (known[:, seen] ** 2).sum()) * R @ known[:, ~seen]
+    return whole
 
 
 def complex_medians(z: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -28,6 +28,20 @@ def test_points_missing_in_the_reference_image_are_placed_by_the_others() -> Non
     assert np.median(np.linalg.norm(reference - W[clearest_image(W_seen, visible)], axis=0)) < 2.0
 
 
+@pytest.mark.parametrize(("points", "missing"), [(250, 0.75), (40, 0.3)])
+def test_all_points_have_a_place_where_images_share_few(points: int, missing: float) -> None:
+    rng = np.random.default_rng(6)
+    W, _ = waving_sheet(rng, points=points, amplitude=0.3, noise_px=0.0)
+    visible = rng.random((12, points)) > missing
+    W_seen = np.where(visible[:, None], W, np.nan)
+    assert ((visible[:, None] & visible).sum(axis=2)[~np.eye(12, dtype=bool)] < 40).all()
+    reference = reference_image(W_seen, visible)
+    seen = visible.any(axis=0)
+    assert np.isfinite(reference[:, seen]).all()
+    off = np.linalg.norm(reference - W[clearest_image(W_seen, visible)], axis=0)[seen]
+    assert np.median(off) < 0.02 * np.ptp(W)
+
+
 def test_an_image_of_the_surface_from_the_side_is_no_reference() -> None:
     W, _ = waving_sheet(np.random.default_rng(5), points=250, amplitude=0.3)
     first = W[0].copy()

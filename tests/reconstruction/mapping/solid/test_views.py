@@ -1,7 +1,8 @@
 import numpy as np
 from hypothesis import given, settings
+from scipy.spatial.transform import Rotation
 
-from reconstruction.mapping.solid.views import building_order, completed, likeness
+from reconstruction.mapping.solid.views import building_order, completed, likeness, with_unseen
 from tests.reconstruction.world import SEEDS, spread
 
 
@@ -44,3 +45,16 @@ def test_views_that_share_nothing_are_built_on_last() -> None:
     assert sorted(order.tolist()) == [0, 1, 2, 3]
     assert np.isfinite(alike.a).all()
     assert np.isfinite(completed(W, visible, alike, int(order[0]))).all()
+
+
+def test_points_that_no_view_shows_are_where_they_were_known_to_be() -> None:
+    rng = np.random.default_rng(4)
+    known = rng.normal(size=(3, 30))
+    R = Rotation.from_rotvec([0.4, -0.9, 0.3]).as_matrix()
+    true = 5.0 * R @ known + np.array([[3.0], [1.0], [-2.0]])
+    seen = np.arange(30) > 3
+    shape = np.where(seen, true, 1e3)
+    np.testing.assert_allclose(with_unseen(shape, seen, known), true, atol=1e-9)
+    alone = with_unseen(shape, seen, None)
+    np.testing.assert_allclose(alone[:, seen], true[:, seen])
+    np.testing.assert_allclose(alone[:, ~seen].T, np.tile(true[:, seen].mean(axis=1), (4, 1)))
