@@ -27,6 +27,7 @@ from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import score, with_missing, with_noise, with_outliers
 from reconstruction.online import Reconstruction
+from tracking.extent import check_extent
 from tracking.tracks import Tracks
 
 FEWEST_FRAMES = 2  # that a point is seen in: one has no depth
@@ -100,6 +101,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
         tracks = tracks.of_points(kept)
         W, visible = W[:, :, kept], visible[:, kept]
         progress.log(f"{int((~kept).sum())} of {points} points are seen in fewer than {FEWEST_FRAMES} frames: left out")
+    check_extent(W, visible)
     reconstruction = prepare(config, tracks)
     collected = Collected(everything=True)
     with threadpool_limits(1), progress:

@@ -134,6 +134,13 @@ def test_tracks_that_show_nothing_are_refused(tmp_path: Path, name: str, says: s
         evaluate(Evaluate(tmp_path / "tracks.npz"), Progress())
 
 
+def test_tracks_of_which_nearly_all_is_hidden_are_refused(tmp_path: Path) -> None:
+    W, _ = swelling_hill()
+    np.savez(tmp_path / "tracks.npz", W=W[:, :, :40])
+    with pytest.raises(TrackingError, match="no frame shows 4 points"):
+        evaluate(Evaluate(tmp_path / "tracks.npz", missing=0.99), Progress())
+
+
 @pytest.mark.parametrize("unseen", [slice(5, 6), slice(0, 15)])
 def test_frames_that_show_nothing_do_not_stop_a_run(tmp_path: Path, unseen: slice) -> None:
     W, _ = swelling_hill()
