@@ -31,6 +31,7 @@ FAIR_SHARE, POOR_SHARE = 0.5, 0.3
 # half times that and more where they really change (a balloon, a crease), and then no rest shape is right.
 FAIR_STRAIN = 1.5
 LITTLE_STRAIN = 0.005  # of lengths: lenses and tracks leave as much over with good shapes
+POOR_STRAIN = 0.018  # of lengths, whyever: no depths have been found that keep them
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 FAIR_CHANGE = 0.03  # what a solid that does not deform leaves over, over its radius: the depth of more is a guess
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
@@ -194,4 +195,4 @@ def evidence(course: Course, found: Map, *, known: bool) -> Iterator[Verdict]:
     usual = float(np.nanmedian(np.asarray(course.errors)))
     if found.sheet is not None and found.sheet.strain_rms > max(FAIR_STRAIN * usual, LITTLE_STRAIN):
         told = f"its lengths change by {found.sheet.strain_rms:.1%}, more than noise explains: it stretches, or has creases"
-        yield Verdict("fair", told)
+        yield Verdict("fair" if found.sheet.strain_rms < POOR_STRAIN else "poor", told)

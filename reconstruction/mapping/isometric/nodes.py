@@ -37,6 +37,12 @@ class Nodes:
         apart = ((np.nan_to_num(reference)[:, :, None] - self.reference[:, None]) ** 2).sum(axis=0)
         return np.asarray(apart.argmin(axis=1))
 
+    def noise_squared(self) -> Array:
+        """Change (F, n) of each edge's length by noise: squared standard deviation, over the edge's largest length."""
+        i, j = self.ends.T
+        longest = np.linalg.norm(self.images[:, :, i] - self.images[:, :, j], axis=1).max(axis=0)
+        return np.asarray((self.variance[:, i] + self.variance[:, j]) / np.maximum(longest, 1e-12) ** 2)
+
     def in_frames(self, chosen: Indices) -> "Nodes":
         """The same in some of the keyframes."""
         return replace(self, images=self.images[chosen], variance=self.variance[chosen])
@@ -74,11 +80,8 @@ def edges_between(nodes: Nodes, values: Array, camera: Camera) -> Edges:
 
     `values` (p, r) are those of the functions that log depths are made of, at all points.
     """
-    i, j = nodes.ends.T
-    longest = np.linalg.norm(nodes.images[:, :, i] - nodes.images[:, :, j], axis=1).max(axis=0)
-    by_noise = (nodes.variance[:, i] + nodes.variance[:, j]) / np.maximum(longest, 1e-12) ** 2
     rays = rays_of(nodes.images, camera)
-    return edges_of(rays, nodes.ends, values[nodes.points], 1 / (1 + by_noise / USUAL_STRAIN**2))
+    return edges_of(rays, nodes.ends, values[nodes.points], 1 / (1 + nodes.noise_squared() / USUAL_STRAIN**2))
 
 
 def nearest(images: Array, others: Array) -> Indices:

@@ -10,7 +10,7 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FUNCTIONS, Lengths, data_normal, stepped
 from reconstruction.mapping.isometric.convex import convex_finish
 from reconstruction.mapping.isometric.lengths import best_start
-from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, rays_of
+from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, nearest, rays_of
 from reconstruction.mapping.isometric.robust_fit import ENOUGH
 from reconstruction.mapping.isometric.smooth_field import SmoothField
 from reconstruction.mapping.isometric.warps import Warps, quick_fit
@@ -71,6 +71,14 @@ class IsometricSheet:
     def strain_rms(self) -> float:
         """Change of length, rms over frames and edges: 0.003 to 0.01 where all is well."""
         return float(np.sqrt((self.strain**2).mean()))
+
+    @property
+    def strain_beyond_noise(self) -> float:
+        """The same without what noise explains."""
+        squared = self.nodes.noise_squared()
+        weights = self.edge_weights / (1 + squared / USUAL_STRAIN**2)
+        by_noise = float((weights * squared).sum() / max(weights.sum(), 1e-12))
+        return float(np.sqrt(max(self.strain_rms**2 - by_noise, 0.0)))
 
     @property
     def log_depths(self) -> Array:
