@@ -135,10 +135,10 @@ def translated(model: Model, before: Model, seen: ShapeEstimate) -> ShapeEstimat
     Raises:
         ValueError: it is behind the camera.
     """
-    focal_px = model.camera.focal_px if model.camera.perspective else FAR * model.radius
-    origin = np.array([*seen.t, focal_px]) / seen.s
+    camera = model.camera if model.camera.perspective else replace(model.camera, focal_px=FAR * model.radius)
+    origin = np.array([*seen.t, camera.focal_px]) / seen.s
     shape = seen.R @ before.basis.deform(seen.Lambda) + origin[:, None]
-    state = model.state_of(shape, focal_px, np.ones(shape.shape[1], np.bool_), None)
+    state = model.state_of(shape, camera, np.ones(shape.shape[1], np.bool_), None)
     if state is None:
         raise ValueError("a shape is behind the camera")
     return model.estimate(seen.frame, seen.projection_px.T, seen.visible, state)

@@ -91,12 +91,12 @@ class Model:
             return np.asarray(R @ self.basis.deform(Lambda) + origin[:, None])
         return np.asarray(s * (R @ self.basis.deform(Lambda)) + np.array([*t, 0.0])[:, None])
 
-    def state_of(self, shape: Array, focal_px: float, seen: Mask, last: State | None) -> State | None:
+    def state_of(self, shape: Array, camera: Camera, seen: Mask, last: State | None) -> State | None:
         """Pose and Λ' (n = 1) with which the model comes nearest to a shape; None if that is behind the camera.
 
         Args:
             shape: (3, p) in camera axes and units of the rest shape.
-            focal_px: focal length that its depth goes with, also of an orthographic camera.
+            camera: in perspective, also where the model's own is orthographic: its depth goes with that focal length.
             seen: (p,) the points to come near to.
             last: the frame before, if there is one (n >= 1): what does not show in these points stays as it was.
         """
@@ -115,8 +115,9 @@ class Model:
             Lambda = np.linalg.solve(gram[modes, modes] + pull * np.eye(r), wanted.T).T
         if origin[2, 0] <= 0:
             return None
-        s = focal_px / (self.scale * self.radius * origin[2, 0])
-        return State(quaternion_from_rotation(R)[None], s * origin[:2].T, np.log([s]), Lambda[None])
+        s = camera.focal_px / (self.radius_px * origin[2, 0])
+        t = s * origin[:2, 0] + self.normalised(camera.center_px[:, None])[:, 0]
+        return State(quaternion_from_rotation(R)[None], t[None], np.log([s]), Lambda[None])
 
     def coarse_edges(self, vertices: int = COARSE_VERTICES) -> CoarseEdges:
         """Edges of a coarse mesh through well-spread points, triangulated in the main plane."""

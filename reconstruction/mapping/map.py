@@ -78,13 +78,13 @@ class Map:
             depth, before = shape[2] - shape[2].mean(), (last.matrices()[-1] @ model.B)[2]
             if depth @ (before - before.mean()) < 0:
                 shape[2] -= 2 * depth
-        return model.state_of(shape, self.sheet.camera.focal_px, foreseen.known, last)
+        return model.state_of(shape, self.sheet.camera, foreseen.known, last)
 
     def state_of(self, model: Model, shape: Array) -> State | None:
         """Pose and Λ' of a shape (3, p) in camera axes, px, by the modes of a sheet; None for a solid."""
         if self.sheet is None:
             return None
-        return model.state_of(shape, self.sheet.camera.focal_px, np.ones(shape.shape[1], np.bool_), None)
+        return model.state_of(shape, self.sheet.camera, np.ones(shape.shape[1], np.bool_), None)
 
     def turned_like(self, shape: Array) -> "Map":
         """The same or its mirror image, whichever is deep where a shape (3, p) is: seen without perspective, both fit."""
@@ -202,7 +202,8 @@ def sheet_map(
         [S[:, known].mean(axis=1) - R @ rest[:, known].mean(axis=1) for S, R in zip(shapes, poses, strict=True)]
     )
     s = found.camera.focal_px / (unit_px * origin[:, 2])
-    motion = RigidMotion(unit_px * rest, np.stack(poses), s, (s * unit_px)[:, None] * origin[:, :2])
+    t = (s * unit_px)[:, None] * origin[:, :2] + found.camera.center_px - camera.center_px
+    motion = RigidMotion(unit_px * rest, np.stack(poses), s, t)
     note = f"sheet from {len(shapes)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
     kind: Kind = "isometric" if given is None else given.kind
     # Its shapes are smooth and go by lengths: there is no noise that more modes would fit, and fewer cut off its bends.

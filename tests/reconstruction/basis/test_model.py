@@ -107,7 +107,7 @@ def test_a_shape_has_a_state_only_before_the_camera(rng: np.random.Generator) ->
     model, state = model_of(relief(rng, POINTS), PERSPECTIVE, MODES), near_state(rng)
     seen = np.ones(POINTS, np.bool_)
     shape = model.estimate(0, np.zeros((2, POINTS)), seen, state).shape
-    found = model.state_of(shape, PERSPECTIVE.focal_px, seen, None)
+    found = model.state_of(shape, PERSPECTIVE, seen, None)
     assert found is not None
     assert np.isfinite(found.log_s).all()
-    assert model.state_of(-shape, PERSPECTIVE.focal_px, seen, None) is None
+    assert model.state_of(-shape, PERSPECTIVE, seen, None) is None
