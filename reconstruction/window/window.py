@@ -93,6 +93,8 @@ class SlidingWindow:
             return self._near(W, visible, expected)
         self.frames += 1
         self._switch = None
+        if self.state is not None and len(self.state) > len(self._data):  # begun by the model before, which saw that frame
+            self.restart()
         weights = start_weights(self._last_shape(), W, visible, self.model.radius_px)
         self._data.append(image_statistics(self.model, W, weights))
         window = self._started(W, weights)

@@ -8,7 +8,7 @@ import pytest
 from app.options.evaluate import Evaluate
 from app.pipeline.evaluate import Evaluation, evaluate
 from app.synthetic.scene import scene
-from app.synthetic.tracks import SEVERE, damaged, tracks
+from app.synthetic.tracks import SEVERE, Damage, damaged, tracks
 from app.terminal.progress import Progress
 from tracking.tracks import Tracks
 
@@ -29,6 +29,21 @@ def evaluated(given: Tracks, folder: Path) -> Evaluation:
 def test_made_up_things_with_gaps_noise_and_gross_errors(tmp_path: Path, kind: str, found: str, bound: float) -> None:
     outcome = evaluated(tracks(scene(kind, 1), SEVERE), tmp_path)
     assert outcome.rest_shape == found
+    assert outcome.score is not None
+    assert outcome.score.e3d <= bound
+
+
+@pytest.mark.parametrize(
+    ("kind", "points", "damage", "bound"),
+    [
+        ("waving-3", 80, Damage(0.4, 0.3, 0.05), 0.02),
+        ("rolling", 80, Damage(0.4, 0.3, 0.05), 0.016),
+        ("cone", 30, Damage(0.2, 0.3), 0.025),  # some frames show fewer than 20 points
+    ],
+)
+def test_sheets_of_few_points_with_gaps(tmp_path: Path, kind: str, points: int, damage: Damage, bound: float) -> None:
+    outcome = evaluated(tracks(scene(kind, 3001), damage, points), tmp_path)
+    assert outcome.rest_shape == "isometric"
     assert outcome.score is not None
     assert outcome.score.e3d <= bound
 

@@ -14,6 +14,7 @@ import numpy as np
 from app.arrays import Flags
 from reconstruction.basis.rest_shape import rms_radius
 from reconstruction.estimate import ShapeEstimate
+from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.solid import relief
 
@@ -27,11 +28,11 @@ FAIR_ERROR, POOR_ERROR = 0.010, 0.018
 POOR_GUESS = 0.005
 # What is not seen is a guess by its neighbours.
 FAIR_SHARE, POOR_SHARE = 0.5, 0.3
-# Lengths of a sheet that keeps them change by what noise makes of them, about as much as the median error; by one and a
-# half times that and more where they really change (a balloon, a crease), and then no rest shape is right.
-FAIR_STRAIN = 1.5
-LITTLE_STRAIN = 0.005  # of lengths: lenses and tracks leave as much over with good shapes
-POOR_STRAIN = 0.018  # of lengths, whyever: no depths have been found that keep them
+# Lengths of a sheet change by less between its shapes, which hold no noise. By more, they really do (a balloon, a crease),
+# and then no rest shape is right, or bends are finer than its functions.
+MOST_STRETCH = 0.0055
+FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
+POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 FAIR_CHANGE = 0.03  # what a solid that does not deform leaves over, over its radius: the depth of more is a guess
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
@@ -96,7 +97,7 @@ def verdict(course: Course, found: Map | None, bits_per_px: float | None = None)
     if bits_per_px is not None:
         told = f"compressed to {bits_per_px:.2g} bits a pixel, texture is made up between key pictures; export it with more"
         findings.append(Verdict("poor", told))
-    findings += evidence(course, found, known=bool(findings))
+    findings += evidence(found, known=bool(findings))
     worst: Grade = next((grade for grade in GRADES if any(one.grade == grade for one in findings)), "good")
     reasons = [one.reason for one in findings if one.grade == worst]
     return Verdict(worst, "; ".join(reasons) or praise(course, found))
@@ -173,7 +174,7 @@ def seen(course: Course) -> Iterator[Verdict]:
         yield Verdict("fair", "the surface is out of sight most of the time; choose its frames with --frames A:B")
 
 
-def evidence(course: Course, found: Map, *, known: bool) -> Iterator[Verdict]:
+def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     """What keyframes say; that there are none goes without saying where something worse is known."""
     if found.evidence is None:
         if found.rest.kind in RECOVERED and not known:
@@ -192,7 +193,19 @@ def evidence(course: Course, found: Map, *, known: bool) -> Iterator[Verdict]:
     if found.rest.kind == "rigid" and max(deep, half) > OTHERWISE_DEEP * min(deep, half):
         told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"
         yield Verdict("fair", f"{told}; film it turning more")
-    usual = float(np.nanmedian(np.asarray(course.errors)))
-    if found.sheet is not None and found.sheet.strain_rms > max(FAIR_STRAIN * usual, LITTLE_STRAIN):
-        told = f"its lengths change by {found.sheet.strain_rms:.1%}, more than noise explains: it stretches, or has creases"
-        yield Verdict("fair" if found.sheet.strain_rms < POOR_STRAIN else "poor", told)
+    if found.sheet is not None:
+        yield from of_sheet(found.sheet, perspective=found.camera.perspective)
+
+
+def of_sheet(found: IsometricSheet, *, perspective: bool) -> Iterator[Verdict]:
+    """What a sheet's lengths, points and camera say."""
+    if not perspective:
+        told = "without perspective a bend and its mirror image look alike, so some frames may bend the other way"
+        yield Verdict("fair", f"{told}; give the camera: K in the file, or --focal")
+    count = int(np.median((found.warps.weights > 0).sum(axis=1)))
+    if count < FEW_POINTS:
+        yield Verdict("fair", f"a sheet by {count} points a frame: what it does between them is a guess; follow more")
+    if found.strain_rms > POOR_STRAIN:
+        yield Verdict("poor", f"its lengths change by {found.strain_rms:.1%}: no shapes have been found that keep them")
+    elif found.stretch > MOST_STRETCH:
+        yield Verdict("fair", f"its lengths change by {found.stretch:.1%}: it stretches, has creases, or fine folds")

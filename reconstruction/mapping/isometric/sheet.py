@@ -80,6 +80,17 @@ class IsometricSheet:
         by_noise = float((weights * squared).sum() / max(weights.sum(), 1e-12))
         return float(np.sqrt(max(self.strain_rms**2 - by_noise, 0.0)))
 
+    @cached_property
+    def stretch(self) -> float:
+        """Change of length between its shapes, rms over frames and all edges, also those that were found to break.
+
+        Once it is bundled, shapes hold hardly any noise: 0.002 to 0.005 where all is well, whatever the noise.
+        """
+        i, j = self.nodes.points[self.nodes.ends].T
+        shapes = self.shapes()
+        logs = np.log(np.linalg.norm(shapes[:, :, i] - shapes[:, :, j], axis=1))
+        return float(np.sqrt(((logs - np.median(logs, axis=0)) ** 2).mean()))
+
     @property
     def log_depths(self) -> Array:
         """(F, p) of all points; NaN for points that no keyframe shows."""

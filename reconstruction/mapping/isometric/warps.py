@@ -158,4 +158,4 @@ def cross_validated(B: Array, W: Array, weights: Array, stiffness: Array) -> flo
         score += (hs[:, None] * off**2).sum(axis=(1, 2))
         counts[0] += hs.sum()
         counts[1] += (inverse * gram).sum(axis=(1, 2))
-    return float(FIRM[np.argmin(score / counts[0] / (1 - counts[1] / counts[0]).clip(1e-3) ** 2)])
+    return float(FIRM[np.argmin(score / counts[0] / (1 - counts[1] / counts[0]).clip(1e-9) ** 2)])

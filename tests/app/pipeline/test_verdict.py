@@ -1,6 +1,8 @@
 """The verdict on a run, by what its frames and keyframes tell."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from app.pipeline.quality.verdict import Course, longest, verdict
 from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera
+from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.selection import Evidence, Misfit
 from reconstruction.mapping.solid.solid import relief
@@ -71,6 +74,36 @@ def test_a_solid_that_half_of_the_keyframes_find_otherwise_deep(factor: float) -
     said = verdict(course([0.001] * 50), replace(SOLID, evidence=half))
     assert said.grade == "fair"
     assert "depth is a guess" in said.reason
+
+
+@dataclass
+class Sheet:
+    """What a verdict asks of one."""
+
+    stretch: float = 0.003
+    strain_rms: float = 0.004
+    points: int = 100
+
+    @property
+    def warps(self) -> SimpleNamespace:
+        return SimpleNamespace(weights=np.ones((30, self.points)))
+
+
+@pytest.mark.parametrize(
+    ("sheet", "focal_px", "grade", "says"),
+    [
+        (Sheet(), 500.0, "good", "many views"),
+        (Sheet(), np.inf, "fair", "without perspective"),
+        (Sheet(stretch=0.008), 500.0, "fair", "change by 0.8%"),
+        (Sheet(stretch=0.008, strain_rms=0.02), 500.0, "poor", "change by 2.0%"),
+        (Sheet(points=25), 500.0, "fair", "25 points"),
+    ],
+)
+def test_a_sheet_by_its_lengths_points_and_camera(sheet: Sheet, focal_px: float, grade: str, says: str) -> None:
+    found = Map(replace(REST, kind="isometric"), Camera(focal_px), cast(IsometricSheet, sheet), evidence=EVIDENCE)
+    said = verdict(course([0.003] * 50), found)
+    assert said.grade == grade
+    assert says in said.reason
 
 
 @pytest.mark.parametrize(("share", "grade"), [(0.9, "good"), (0.4, "fair"), (0.2, "poor")])

@@ -86,6 +86,22 @@ def test_a_sheet_before_an_orthographic_camera() -> None:
     assert min(expected_error(found, W, S), expected_error(found, W, mirrored)) < 0.12
 
 
+def test_a_sheet_before_an_orthographic_camera_is_where_its_points_are() -> None:
+    _, S, _ = waving()
+    W = 300 * (S - S.mean(axis=2, keepdims=True))[:, :2] + np.array([320.0, 240.0])[:, None]
+    visible = np.ones(POINTS, bool)
+    found = map_of(W, np.ones((FRAMES, POINTS), bool), Camera(), estimate_focal=False)
+    assert found is not None
+    model = build_model(found.rest, found.camera, 20)
+    for w in W:
+        state = found.expected(model, found.foreseen([(w, visible)])[0], None)
+        assert state is not None
+        assert np.median(np.linalg.norm(model.projection(state) - w, axis=0)) < 0.01 * np.ptp(W)
+    motion = found.rest.motion
+    posed = motion.s[:, None, None] * motion.R @ motion.shape
+    np.testing.assert_allclose((posed[:, :2] + motion.t[:, :, None]).mean(axis=(0, 2)), [320, 240], atol=10)
+
+
 def test_a_solid() -> None:
     rng = np.random.default_rng(3)
     rest = relief(rng, 120)

@@ -18,6 +18,16 @@ def test_smooth_images_are_nearer_to_the_truth_than_the_observations() -> None:
     assert np.median(warps.noise_px) == pytest.approx(0.5, rel=0.25)
 
 
+def test_as_many_functions_as_points_do_not_follow_the_noise() -> None:
+    W, S = waving_sheet(np.random.default_rng(7), points=60, amplitude=0.2, noise_px=0.5)
+    warps = smooth_warps(W, np.ones((12, 60), bool))
+    assert warps.values.shape[1] == 60
+    assert np.median(warps.noise_px) > 0.2  # of 0.5: an image that goes through its points says 0
+    true = CAMERA.project(S)
+    rms = [np.sqrt(((w - true) ** 2).mean()) for w in (W, warps.images())]
+    assert rms[1] < 0.9 * rms[0]
+
+
 def test_points_missing_in_the_reference_image_are_placed_by_the_others() -> None:
     rng = np.random.default_rng(2)
     W, _ = waving_sheet(rng, points=250, amplitude=0.3, noise_px=0.0)
