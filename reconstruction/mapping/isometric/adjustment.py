@@ -44,6 +44,7 @@ TORN = 2.5  # the worst edges' change over the usual one: strays spoil the start
 LITTLE_GAIN = 0.1  # of the change: a round that brought less is the last
 MOST_CHANGE = 0.0175  # of lengths, rms, noise apart: faces change by 0.019 to 0.049, sheets by up to 0.014, once 0.017
 MOST_AT_ALL = 0.035  # with noise: what is that far off smooth images is not noise
+MOST_NOISE = 0.04  # over the image's RMS radius: what hides that much is no smooth image, and keeps any lengths
 PART_LEFT_OUT = 0.4  # of the points
 SOLVER = Solver()
 
@@ -59,13 +60,16 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
         camera: its focal length is taken as it is.
 
     Raises:
-        ReconstructionError: the camera is orthographic, there are fewer than 3 frames or 20 points, or lengths change.
+        ReconstructionError: the camera is orthographic, there are fewer than 3 frames or 20 points, images are not smooth,
+            or lengths change.
     """
     if not camera.perspective:
         raise ReconstructionError("a sheet's depths along its rays need a perspective camera")
     warps = smooth_warps(W, visible)
     if len(W) < 3 or warps.placed.sum() < 20:
         raise ReconstructionError("a sheet of unknown shape needs 3 keyframes and 20 points")
+    if (noise := warps.noise_over_size) > MOST_NOISE:
+        raise ReconstructionError(f"no smooth surface: points are {noise:.1%} of its size beside smooth images")
     return on_smooth_images(warps, camera)
 
 

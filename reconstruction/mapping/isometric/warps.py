@@ -59,6 +59,12 @@ class Warps:
         """Where points are in all images, (F, 2, n) px."""
         return np.asarray((self.values[points] @ self.coefficients).transpose(0, 2, 1))
 
+    @property
+    def noise_over_size(self) -> float:
+        """Usual noise over the images' RMS radius."""
+        size = np.sqrt(self.images(self.placed).var(axis=2).sum(axis=1))
+        return float(np.median(self.noise_px / size.clip(1e-300)))
+
     def variance(self, points: Mask | Indices | slice = slice(None)) -> Array:
         """Variance (F, n) px² of a coordinate of those: small among visible points, large far from any."""
         at = self.values[points]

@@ -27,6 +27,7 @@ ASIDE = 0.02  # weight of a point that does not move with the solid among the ne
 LEAST = 0.05  # of the usual distance from the neighbours' plane: no depth is surer
 ROUNDS = 3  # of leaving out what is a spike
 LARGEST = 0.8  # times half the width, both RMS, that a vertex may be off its neighbours' plane; 12 % of the width across
+USUAL = 4.0  # times the usual distance that it may, too: with few points, most are far from their neighbours' plane
 PROVEN = 20.0  # standard deviations of its depth that it may, too: a nose of few points is no spike
 SMOOTHEST = 0.1  # times the same: no surface is believed to be smoother, or creases would be rounded
 
@@ -52,8 +53,8 @@ def smoothed(W: Array, visible: Mask, bundle: Bundle, residual: Array) -> tuple[
     noise = np.sqrt((own**2 + sigma**2) / 2)
     spread = np.minimum(depth_variance(information) * noise**2 * LIKE_VIEWS, deep**2)
 
-    def spike(off: Array) -> Mask:
-        return np.asarray((np.abs(off) > LARGEST * deep) & (np.abs(off) < PROVEN * np.sqrt(spread)))
+    def spike(off: Array, tau: float) -> Mask:
+        return np.asarray((np.abs(off) > max(LARGEST * deep, USUAL * tau)) & (np.abs(off) < PROVEN * np.sqrt(spread)))
 
     for _ in range(ROUNDS):
         D, distance = off_neighbours_plane(shape[:2], sound)
@@ -62,10 +63,10 @@ def smoothed(W: Array, visible: Mask, bundle: Bundle, residual: Array) -> tuple[
         weight = np.where(sound, 1 / (spread + (LEAST * tau) ** 2), 1 / deep**2)
         stiffness = D.T @ sp.diags_array((np.median(distance) / (tau * distance)) ** 2) @ D
         z = np.asarray(spsolve((sp.diags_array(weight) + stiffness).tocsc(), weight * shape[2]))
-        sound = sound & ~spike(D @ z)
+        sound = sound & ~spike(D @ z, tau)
     D, _ = off_neighbours_plane(shape[:2], np.ones_like(sound))
     for _ in range(ROUNDS):  # what smoothing left, most of it at the border: there, the plane would carry it off
-        far = spike(D @ z)
+        far = spike(D @ z, tau)
         sound = sound & ~far
         z = z - np.where(far, off_neighbours_plane(shape[:2], sound)[0] @ z, 0.0)
     return replace(bundle.motion, shape=axes @ (shape + along(information, z - shape[2]))), sound

@@ -132,6 +132,13 @@ def test_frames_in_another_minimum_are_found_again() -> None:
     assert float(e3d(in_frames(wrong, W), S).mean()) < 0.03
 
 
+def test_points_of_their_own_are_no_sheet() -> None:
+    rng = np.random.default_rng(5)
+    W, _ = waving_sheet(rng, frames=15)
+    with pytest.raises(ReconstructionError, match="no smooth surface"):
+        sheet(W + rng.normal(0, 0.08 * np.sqrt(W[0].var(axis=1).sum()), W.shape), np.ones((15, W.shape[2]), bool), CAMERA)
+
+
 def test_what_stretches_is_no_sheet() -> None:
     rng = np.random.default_rng(7)
     W, _ = waving_sheet(rng, frames=15)

@@ -41,3 +41,13 @@ def test_points_that_do_not_move_with_the_solid_take_their_neighbours_depth():
     assert solid.trusted[tame].mean() > 0.95
     assert shape_error(solid.shape[:, tame], shape[:, tame]) < 0.02
     assert worst_spike(solid.shape) < 0.15
+
+
+def test_what_stands_out_of_few_points_is_no_spike():
+    rng = np.random.default_rng(3)
+    shape = np.concatenate([spread(rng, 36), rng.normal(0, 25, (1, 36))])  # most are far from their neighbours' plane
+    shape[2, 14] = 90.0
+    W, _ = seen(np.repeat(shape[None], 14, axis=0), turns(14), PERSPECTIVE)
+    W = W + rng.normal(0, 1.5, W.shape)
+    solid = bundle_adjust(W, rng.random((14, 36)) > 0.4, PERSPECTIVE)
+    assert shape_error(solid.shape, shape) < 0.1
