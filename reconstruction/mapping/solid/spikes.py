@@ -29,7 +29,7 @@ ROUNDS = 3  # of leaving out what is a spike
 LARGEST = 0.8  # times half the width, both RMS, that a vertex may be off its neighbours' plane; 12 % of the width across
 USUAL = 4.0  # times the usual distance that it may, too: with few points, most are far from their neighbours' plane
 PROVEN = 20.0  # standard deviations of its depth that it may, too: a nose of few points is no spike
-SMOOTHEST = 0.1  # times the same: no surface is believed to be smoother, or creases would be rounded
+SMOOTHEST = 0.1  # times half the width: no surface is believed to be smoother, or creases would be rounded
 
 
 def smoothed(W: Array, visible: Mask, bundle: Bundle, residual: Array) -> tuple[RigidMotion, Mask]:
