@@ -1,5 +1,6 @@
 """`modeshape retexture`: a picture on the moving surface: in a recording, in a video, or live while a camera is tracked."""
 
+import sys
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -119,7 +120,9 @@ def follow(command: Retexture, painter: Painter, progress: Progress) -> RunSumma
     Raises:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
     """
-    session = Session(command.run, progress, record=False)
+    run = command.run
+    as_it_is = replace(run.output, image_width=sys.maxsize)  # of pictures that are painted nothing is lost
+    session = Session(replace(run, output=as_it_is), progress, record=False)
     surface = None
     with closing(session.frames()) as frames:
         for one in frames:

@@ -33,7 +33,8 @@ class Output(Json, Overwrite):
     image: Literal["jpeg", "video", "none"] = "jpeg"
     """How frames are stored in the recording: each as JPEG, the video file as it is, or not at all."""
     image_width: int | None = None
-    """Of the JPEGs, at most, px: smaller recordings of large pictures. Overlays and painted videos are as sharp as that."""
+    """Of the JPEGs, at most, px; without it, those of pictures 2560 px wide and more are at most 1920. Overlays of a
+    recording, and videos painted from it, are as sharp as that."""
     color: Literal["depth", "strain", "curvature"] = "depth"
     """What the mesh is coloured by in the view from the side: depth (with --uncertainty, that), strain (red is 5 % longer
     than at rest), or curvature (red bulges to the camera, blue is hollow)."""
@@ -83,8 +84,8 @@ class Source:
     drop_late: bool = False
     """Of a camera or stream, take always the newest frame, and leave out those there is no time for."""
     full_size: bool = False
-    """Follow points in the pictures as they are; without it, in copies of those 2560 px wide and more, a half to a
-    quarter as wide. Pixels of the results are the pictures' either way."""
+    """Follow points in the pictures as they are, and record those; without it, copies of those 2560 px wide and more.
+    Pixels of the results are the pictures' either way."""
     points: int = 800
     """Most points tracked."""
     rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|PATH")] = "auto"

@@ -116,7 +116,6 @@ class TrackedObject:
             "configuration": configuration(self.config),
             "size": (width, height),
             "image": output.image,
-            "image_width": output.image_width,
             "color": output.color,
             "video": Path(self.config.source),
             "overwrite": output.overwrite,

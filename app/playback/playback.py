@@ -230,10 +230,10 @@ class Playback:
             UsageError: they are not all of one size.
         """
         size = self.recorded_model.size if self.recorded_model else None
-        stored = None if self.configuration.get("image_width") else size
+        stored: tuple[int, ...] = ()
         for i, image in stored_images(self.file, self.frames.tolist()):
             if image is not None:
-                stored = stored or (image.shape[1], image.shape[0])
+                stored = stored or image.shape[1::-1]
                 if image.shape[1::-1] != stored:
                     raise UsageError(f"{self.path} holds pictures of several sizes: run again to make another")
             yield i, enlarged(image, size)

@@ -6,14 +6,16 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 from app.arrays import Image
-from app.options.run import Source
+from app.options.run import Run
 from app.pipeline.stages.working_copy import WorkingCopy
 from tracking.region.mask import region_mask
 from tracking.region.search import Found, search
 from tracking.region.surface import Surface
 from tracking.video import Frame, Video
 
-MOST_BYTES = 200 * 2**20  # of the first pictures that are kept while the surface is looked for
+MOST_BYTES = (
+    600 * 2**20
+)  # of the first pictures that are kept while the surface is looked for: as many as it takes of full HD
 LEADING = 10  # of those, when late ones are left out, lead from the first to the newest
 
 
@@ -32,14 +34,14 @@ class FirstLook:
     notes: list[str]
 
 
-def first_look(config: Source, video: Video) -> FirstLook:
+def first_look(config: Run, video: Video) -> FirstLook:
     """Look for the surface in the first frames of a video, which are kept meanwhile, or read again if too large.
 
     Raises:
         TrackingError: no frame with texture, or a region or mask that does not fit the picture.
     """
-    region, frames = region_mask(video.size, config.roi, config.mask, config.outline), iter(video)
-    copy = WorkingCopy(video.size, full=config.full_size)
+    copy, region = WorkingCopy.of(config, video.size), region_mask(video.size, config.roi, config.mask, config.outline)
+    frames: Iterator[Frame] = map(copy.keep, video)
     if not config.search or config.outline is not None:  # drawn by hand
         return FirstLook(frames, region, [])
     kept = deque[Frame]()
@@ -47,7 +49,7 @@ def first_look(config: Source, video: Video) -> FirstLook:
     if config.drop_late:
         kept = deque(frame for frame in kept if frame.index >= found.first.index)
         kept = deque(list(kept)[:: len(kept) // LEADING + 1])
-    frames = chain(emptied(kept), frames) if kept else again(config)
+    frames = chain(emptied(kept), frames) if kept else map(copy.keep, again(config))
     begun = next(frame for frame in frames if frame.index >= found.first.index)
     return FirstLook(chain([begun], frames), found.region, notes_on(found, video.first_index))
 
@@ -71,7 +73,7 @@ def emptied(kept: deque[Frame]) -> Iterator[Frame]:
         yield kept.popleft()
 
 
-def again(config: Source) -> Iterator[Frame]:
+def again(config: Run) -> Iterator[Frame]:
     """All frames of a file."""
     with Video(config.source, *config.frame_range, duration_s=config.duration) as video:
         yield from video

@@ -21,11 +21,13 @@ class Opened:
 
     Attributes:
         size: (width, height) px.
+        kept: (width, height) px of its pictures as they are kept.
         fps: announced rate.
         frame_count: announced number of frames, if any.
     """
 
     size: tuple[int, int]
+    kept: tuple[int, int]
     fps: float
     frame_count: int | None
 

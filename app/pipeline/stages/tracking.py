@@ -44,10 +44,10 @@ class TrackingStage:
             drop_late=config.drop_late,
             log=self._told.append,
         )
-        self._copy = WorkingCopy(self.video.size, full=config.full_size)
+        self._copy = WorkingCopy.of(config, self.video.size)
         if self._copy.factor > 1:
-            width, height = (side // self._copy.factor for side in self.video.size)
-            self._told.append(f"points are followed in pictures of {width}x{height} px; --full-size takes all of them")
+            followed, kept = ("{}x{}".format(*size) for size in (self._copy.size, self._copy.kept))
+            self._told.append(f"pictures are recorded at {kept} px, points followed at {followed}; --full-size uses all")
         self._frames: Iterator[Frame] | None = None
         self._trackers: dict[int, GuardedTracker] = {}
         self._region: Image | None = None  # where the next object begins, if that is known
@@ -58,7 +58,7 @@ class TrackingStage:
     @property
     def opened(self) -> Opened:
         """What is known before the first frame."""
-        return Opened(self.video.size, self.video.fps, self.video.frame_count)
+        return Opened(self.video.size, self._copy.kept, self.video.fps, self.video.frame_count)
 
     def next(self, asked: Asked, keep: Callable[[int, Image], None]) -> Seen | None:
         """The next frame; None at the end of the source. `keep` takes its number and picture before it is looked at.

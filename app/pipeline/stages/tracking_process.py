@@ -77,7 +77,7 @@ class TrackingProcess:
     def __init__(self, remote: Remote, pictures: int) -> None:
         self._remote = remote
         self.opened: Opened = self._remote.receive()
-        self.ring = Ring(pictures, self.opened.size)
+        self.ring = Ring(pictures, self.opened.kept)
 
     def send(self, asked: Asked) -> None:
         """Ask for another frame."""
@@ -112,7 +112,7 @@ def main() -> None:
         if isinstance(message, Asked):
             return stage.next(message, ring.write)
         stage = TrackingStage(message)
-        ring = Ring(pictures, stage.video.size)
+        ring = Ring(pictures, stage.opened.kept)
         return stage.opened
 
     serve(connection, answer)

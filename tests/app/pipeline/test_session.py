@@ -8,10 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
+from app.files.video_out import writable_video
 from app.options.model import Model
 from app.options.run import Output, Run
 from app.pipeline.session import Session
+from app.pipeline.stages.working_copy import resized
+from app.playback.images import stored_images
 from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
@@ -20,6 +24,9 @@ from reconstruction.estimate import ShapeEstimate, Switch
 from reconstruction.state import State
 from reconstruction.window.window import SlidingWindow
 from tests.synthetic_run import verify
+from tracking.video import Video
+
+LARGE = (2560, 1920)
 
 
 def config(
@@ -67,6 +74,22 @@ def test_frames_keep_their_numbers_in_the_source(videos: Path) -> None:
     assert words["interrupted"] is False
     with np.load("shapes.npz") as shapes:
         assert shapes["frames"].tolist() == list(range(7, 25))
+
+
+def test_large_pictures_are_recorded_smaller_and_results_are_in_their_pixels(videos: Path) -> None:
+    small = quick(videos)
+    with Video(small.source, 0, 20) as video, writable_video(Path("large.mp4"), LARGE, video.fps) as sink:
+        factor = LARGE[0] / video.size[0]
+        for frame in video:
+            sink.write(resized(frame.image, LARGE), frame.time_s)
+    output = replace(small.output, image="jpeg", out=Path("large.rrd"))
+    Session(replace(small, source="large.mp4", output=output), Progress()).run()
+    Session(small, Progress()).run()
+    large, usual = Playback.load(Path("large.rrd")), Playback.load(Path("run.rrd"))
+    stored = {image.shape[1::-1] for _, image in stored_images(large.file, large.frames.tolist()) if image is not None}
+    assert stored == {(LARGE[0] // 2, LARGE[1] // 2)}
+    assert {image.shape[1::-1] for _, image in large.images() if image is not None} == {LARGE}
+    assert_allclose(np.nanmedian(large.W, axis=2), factor * np.nanmedian(usual.W, axis=2), atol=0.05 * LARGE[0])
 
 
 def test_stages_add_up_to_the_time_it_took(videos: Path) -> None:

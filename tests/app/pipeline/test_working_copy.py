@@ -9,6 +9,7 @@ from app.pipeline.stages.tracking import first_points
 from app.pipeline.stages.working_copy import WorkingCopy
 from tests.tracking.scene import SIZE, texture
 from tracking.guarded import GuardedTracker
+from tracking.video import Frame
 
 
 @pytest.mark.parametrize(
@@ -17,6 +18,27 @@ from tracking.guarded import GuardedTracker
 def test_only_large_pictures_have_one(size: tuple[int, int], factor: int) -> None:
     assert WorkingCopy(size).factor == factor
     assert WorkingCopy(size, full=True).factor == 1
+
+
+@pytest.mark.parametrize(
+    ("size", "wide", "kept"),
+    [
+        ((1920, 1080), 0, (1920, 1080)),
+        ((2560, 1440), 0, (1280, 720)),
+        ((3840, 2160), 0, (1920, 1080)),
+        ((2160, 3840), 640, (1080, 1920)),  # the recording makes them smaller still
+        ((3840, 2160), 2560, (3840, 2160)),
+    ],
+)
+def test_large_pictures_are_kept_smaller_unless_more_is_asked_for(
+    size: tuple[int, int], wide: int, kept: tuple[int, int]
+) -> None:
+    copy = WorkingCopy(size, wide=wide)
+    frame = copy.keep(Frame(3, 0.1, np.zeros((size[1], size[0], 3), np.uint8)))
+    assert frame.image.shape[1::-1] == copy.kept == kept
+    assert (frame.index, frame.time_s) == (3, 0.1)
+    assert copy.picture(frame.image).shape[1::-1] == copy.size
+    assert WorkingCopy(size, full=True).kept == size
 
 
 def test_points_there_and_back() -> None:

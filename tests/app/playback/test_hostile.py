@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -81,6 +82,7 @@ def test_a_reader_that_ends_is_told(run: Run, monkeypatch: pytest.MonkeyPatch) -
 
 def test_pictures_are_of_one_size(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     playback = Playback.load(run.path)
-    monkeypatch.setattr("app.playback.images.decoded", lambda _: np.zeros((3, 4, 3), np.uint8))
+    sides = count(3)
+    monkeypatch.setattr("app.playback.images.decoded", lambda _: np.zeros((next(sides), 4, 3), np.uint8))
     with pytest.raises(UsageError, match="pictures of several sizes"):
         list(playback.images())
