@@ -232,7 +232,7 @@ class Reconstruction:
         self.deformation = constraints.fitting(self.settings.deformation, flat=sheet)
         self.metric = distances.fitting(self.settings.metric, flat=sheet)
         modes = min(found.modes, rest.motion.shape.shape[1] - 1) if self.settings.modes == "auto" else self.settings.modes
-        model = build_model(rest, self.camera, modes, self.metric, self._mesh)
+        model = build_model(rest, self.camera, modes, self.metric, self._mesh, found.seen)
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
         keeps_lengths = self.deformation in ("bending", "inextensible")

@@ -13,7 +13,7 @@ from matplotlib.tri import Triangulation
 from app.arrays import Array, Indices
 from app.recording.modes import MOVEMENT_RGB, View, brightness, displaced, normalised
 from reconstruction.basis.distances import dissimilarity
-from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.mesh import Mesh, boundary
 from reconstruction.basis.modal_basis import ModalBasis
 from reconstruction.basis.modes import doubly_centred, exact_points
 from reconstruction.settings import Metric
@@ -123,13 +123,6 @@ def lines(axes: Axes, ends: Array, color: str, width: float, alpha: float = 1.0)
     gaps = np.full((len(ends), 1, 2), np.nan)
     x, y = np.concatenate([ends, gaps], axis=1).reshape(-1, 2).T
     axes.plot(x, y, color=color, linewidth=width, alpha=alpha, solid_capstyle="butt", zorder=1)
-
-
-def boundary(faces: Indices) -> Indices:
-    """Edges (n, 2) that belong to one triangle only."""
-    pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    edges, count = np.unique(pairs, axis=0, return_counts=True)
-    return np.asarray(edges[count == 1], np.int64)
 
 
 def draw_spectrum(axes: Axes, used: Array, eigenvalues: Array) -> None:

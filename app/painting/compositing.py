@@ -48,7 +48,8 @@ class Compositor:
         h, w = first.shape[:2]
         self._opacity = placement.opacity
         self._perspective = perspective
-        self._reference_px = reference_px
+        self._vertices, mesh = mesh.vertices, mesh.alone()
+        self._reference_px = reference_px = reference_px[self._vertices]
         reach = extent(placement.outline, reference_px, mesh.faces, (w, h))
         self._corners = reach.quad if placement.corners is None else placement.corners
         self._surface = Surface(reference_px, mesh, reach.quad, reach.region, sheet=reach.told)
@@ -84,6 +85,7 @@ class Compositor:
             depth: (p,) their depths.
             observed_px: (p, 2) where they are seen, NaN where they are not.
         """
+        projection_px, depth, observed_px = (of_all[self._vertices] for of_all in (projection_px, depth, observed_px))
         points = self._surface.corrected(projection_px, observed_px)
         nodes, depths = self._surface.nodes(projection_px, depth, points, perspective=self._perspective)
         if self._outline is not None:

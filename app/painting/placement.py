@@ -145,9 +145,11 @@ def in_first_frame(
         perspective: whether the camera is.
     """
     assert placement.corners is not None
+    vertices, mesh = mesh.vertices, mesh.alone()
+    reference_px = reference_px[vertices]
     reach = extent(placement.outline, reference_px, mesh.faces, size)
     surface = Surface(reference_px, mesh, reach.quad, None, sheet=reach.told)
-    projection_px, depth, observed_px = at
+    projection_px, depth, observed_px = (of_all[vertices] for of_all in at)
     points = surface.corrected(projection_px, observed_px)
     nodes, _ = surface.nodes(projection_px, depth, points, perspective=perspective)
     return replace(placement, corners=first_frame_px(placement.corners, nodes, surface.net))

@@ -33,7 +33,7 @@ def overlaid(playback: Playback) -> Iterator[tuple[int, Image]]:
     Raises:
         UsageError: the recording has no pictures, or no model.
     """
-    edges = playback.mesh.edges
+    edges, drawn = playback.mesh.edges, playback.mesh.vertices
     size = enlarged(playback.size)
     a, b = playback.texture_px[edges].transpose(1, 0, 2)
     apart = float(np.median(np.linalg.norm(a - b, axis=1))) * size[0] / playback.size[0]
@@ -56,8 +56,8 @@ def overlaid(playback: Playback) -> Iterator[tuple[int, Image]]:
             projected = estimate.projection_px
             canvas.lines(projected[edges], MESH_RGB, MESH_OPACITY)
             canvas.lines(np.stack([observed, projected], axis=1)[visible], ERROR_RGB)
-            canvas.points(projected[~visible], PREDICTED_RGB)
-            words.append(("predicted", int((~visible).sum()), PREDICTED_RGB))
+            canvas.points(projected[drawn[~visible[drawn]]], PREDICTED_RGB)
+            words.append(("predicted", int((~visible[drawn]).sum()), PREDICTED_RGB))
         else:
             canvas.points(missing, LOST_RGB)
             words.append(("lost", int((~visible).sum()), LOST_RGB))

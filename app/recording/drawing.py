@@ -87,7 +87,8 @@ def draw(stream: Stream, shape: Shape) -> None:
         colors = depth_colors(vertices) if shape.sigma is None else uncertainty_colors(shape.sigma, vertices)
     stream.row(entities.MESH, rr.Mesh3D.columns, vertex_positions=vertices.T.astype(np.float32), vertex_colors=colors)
     stream.row(entities.WIREFRAME, rr.LineStrips2D.columns, strips=shape.strips.through(projection))
-    stream.points(entities.PREDICTED, projection[~shape.visible])
+    drawn = shape.model.mesh.vertices
+    stream.points(entities.PREDICTED, projection[drawn[~shape.visible[drawn]]])
     if shape.errors_px.size:
         stream.scalars(entities.ERROR, *shape.errors_px)
     spectrum = rr.components.TensorDataBatch(shape.Lambda.astype(np.float32).ravel()).as_arrow_array()

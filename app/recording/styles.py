@@ -1,4 +1,4 @@
-"""What a recording says once: models, colours, names and sizes of what is drawn, and where the scene stands."""
+"""What a recording says once: models, colours, names and sizes of what is drawn."""
 
 from collections.abc import Iterator
 
@@ -11,7 +11,6 @@ from app.recording.columns import Values
 from app.recording.stream import Loggable
 from app.recording.wireframe import Strips
 from reconstruction.basis.model import Model
-from reconstruction.camera import Camera
 from reconstruction.settings import FIRST_LOOKS
 
 SEEN_RGB = (64, 224, 128)
@@ -28,8 +27,6 @@ LAMBDA_RGB = (
 
 LEADING = len(LAMBDA_RGB[0])
 """Entries per row of Λ that are plotted over time."""
-
-FRUSTUM = 0.4  # length of the camera's pyramid; the mesh has unit size, and is farther away
 
 HELP = """\
 # What you see
@@ -81,26 +78,6 @@ def coefficient_styles(modes: int) -> Iterator[tuple[str, Loggable]]:
     abscissa = rr.components.TensorDataBatch(places).described(rr.BarChart.descriptor_abscissa())
     color = rr.components.ColorBatch(SPECTRUM_RGB).described(rr.BarChart.descriptor_color())
     yield entities.SPECTRUM, [abscissa, color]
-
-
-def placement(vertices: Array, camera: Camera, size: tuple[int, int]) -> Iterator[tuple[str, Loggable]]:
-    """Gives the first shape (p, 3) unit size at the origin, where the blueprint's eye looks."""
-    center = vertices.mean(axis=0)
-    scale = 1.0 / max(float(np.sqrt(np.mean(np.sum((vertices - center) ** 2, axis=1)))), 1e-9)
-    for entity in (entities.MESH, entities.TRUTH):
-        yield entity, rr.Transform3D(translation=-scale * center, scale=scale)
-    if camera.perspective:
-        # The viewer has no scaled cameras, and needs none: moved like the mesh, the camera sees the same.
-        yield entities.CAMERA, rr.Transform3D(translation=-scale * center)
-        yield (
-            entities.CAMERA,
-            rr.Pinhole(
-                image_from_camera=camera.K,
-                resolution=size,
-                camera_xyz=rr.ViewCoordinates.RDF,
-                image_plane_distance=FRUSTUM,
-            ),
-        )
 
 
 def model_components(

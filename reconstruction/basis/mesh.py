@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from reconstruction import ReconstructionError
-from reconstruction.arrays import Array, Indices
+from reconstruction.arrays import Array, Indices, Mask
 
 SLIVER_DEGREES = 10.0  # triangles on the border with a smaller angle bridge a dent of the outline: nothing is seen there
+CHANCE = 3.0  # standard deviations of a count that come about by chance
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,15 @@ class Mesh:
 
     faces: Indices
     edges: Indices
+
+    @property
+    def vertices(self) -> Indices:
+        """The points (n,) that it has triangles at, ascending."""
+        return np.unique(self.faces)
+
+    def alone(self) -> "Mesh":
+        """The same of its `vertices` only, which are numbered anew."""
+        return mesh_from_faces(np.searchsorted(self.vertices, self.faces))
 
 
 def unique_edges(faces: Indices) -> Indices:
@@ -68,6 +78,29 @@ def without_slivers(points: Array, faces: Indices) -> Indices:
         first = np.full(len(points), len(faces))
         np.minimum.at(first, faces[out], out[:, None])  # one at a time around each point: its last one stays
         kept[out[(first[faces[out]] == out[:, None]).all(axis=1)]] = False
+
+
+def boundary(faces: Indices) -> Indices:
+    """Edges (n, 2) that belong to one of the triangles (m, 3) only."""
+    pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    edges, count = np.unique(pairs, axis=0, return_counts=True)
+    return np.asarray(edges[count == 1], np.int64)
+
+
+def without_strays(mesh: Mesh, seen: Mask) -> Mesh:
+    """A mesh without vertices at its border that are seen (K, p) much more seldom than those around: they are beside it.
+
+    Where the surface's contour crosses another is a corner to whoever follows corners, but it goes with neither.
+    """
+    count, points = seen.sum(axis=0).astype(float), seen.shape[1]
+    i, j = mesh.edges.T
+    degree = np.maximum(np.bincount(mesh.edges.ravel(), minlength=points), 1)
+    around = (np.bincount(i, count[j], points) + np.bincount(j, count[i], points)) / degree
+    stray = np.zeros(points, np.bool_)
+    stray[boundary(mesh.faces)] = True
+    stray &= around - count > CHANCE * np.sqrt(around)
+    faces = mesh.faces[~stray[mesh.faces].any(axis=1)]
+    return mesh_from_faces(faces) if stray.any() and len(faces) else mesh
 
 
 def smallest_angle(points: Array, faces: Indices) -> Array:

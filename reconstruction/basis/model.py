@@ -10,7 +10,7 @@ import numpy as np
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.constraints import CoarseEdges
-from reconstruction.basis.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges
+from reconstruction.basis.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges, without_strays
 from reconstruction.basis.modal_basis import ModalBasis, principal_axes
 from reconstruction.basis.rest_shape import RestShape, rms_radius
 from reconstruction.camera import Camera, nearest_rotation, quaternion_from_rotation, rotation_from_quaternion
@@ -130,16 +130,29 @@ class Model:
 
 
 def build_model(
-    rest: RestShape, camera: Camera, modes: int, metric: Metric = "euclidean", mesh: Mesh | None = None
+    rest: RestShape,
+    camera: Camera,
+    modes: int,
+    metric: Metric = "euclidean",
+    mesh: Mesh | None = None,
+    seen: Mask | None = None,
 ) -> Model:
     """Mesh and modes of a rest shape.
+
+    Args:
+        rest: the rest shape.
+        camera: what sees it.
+        modes: how many.
+        metric: the dissimilarity they come from.
+        mesh: its mesh, if it has one; else points are triangulated in its main plane,
+        seen: and those that views (K, p) hardly ever show left out at the border: modes are those of all points.
 
     Raises:
         ReconstructionError: more modes than the points carry.
     """
     from reconstruction.basis.modes import modal_basis  # SciPy takes its time to load, and who only draws needs none
 
-    shape = rest.motion.shape
+    shape, given = rest.motion.shape, mesh
     if mesh is None:
         mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
         x, y = (rest.motion.R[0] @ shape)[:2]
@@ -147,4 +160,7 @@ def build_model(
         area = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a])
         if area.sum() > 0:  # y points down: outward normals face the camera when the image winds the other way
             mesh = mesh_from_faces(mesh.faces[:, ::-1])
-    return Model(modal_basis(shape, mesh, modes, metric), mesh, camera, float(rest.motion.s[0]))
+    basis = modal_basis(shape, mesh, modes, metric)
+    return Model(
+        basis, without_strays(mesh, seen) if given is None and seen is not None else mesh, camera, float(rest.motion.s[0])
+    )

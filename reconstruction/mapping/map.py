@@ -40,6 +40,7 @@ class Map:
         modes: how many it is worth.
         focal_note: how the focal length was found, in words; empty if it was not looked for.
         evidence: what keyframes say for it, half against half; None before there are enough of them.
+        seen: (K, p) what the keyframes show; None where it is not by keyframes.
     """
 
     rest: RestShape
@@ -49,6 +50,7 @@ class Map:
     modes: int = USUAL_MODES
     focal_note: str = ""
     evidence: Evidence | None = None
+    seen: Mask | None = None
 
     def foreseen(self, frames: list[tuple[Array, Mask]], usual: float = 0.0) -> list[Foreseen | None]:
         """What `expected` finds in frames by themselves, points (2, p) px, anything where not visible (p,).
@@ -138,6 +140,7 @@ def map_of(
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
+    found = replace(found, seen=visible)
     if not (estimate_focal and camera.perspective):
         return found
     return replace(found, focal_note=f"focal length {found.camera.focal_px:.0f} px, from {len(W)} keyframes")

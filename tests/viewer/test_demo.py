@@ -11,6 +11,7 @@ from app import demo
 from app.options.run import Output, Run
 from app.pipeline.session import Session
 from app.playback.playback import Playback
+from app.recording import entities
 from app.terminal.progress import Progress
 from tests.viewer.conftest import Viewer
 from tests.viewer.screenshot import SETTLE_S, shot
@@ -39,13 +40,15 @@ def playback(viewer: Viewer, tmp_path_factory: pytest.TempPathFactory) -> Playba
 
 def on_screen(playback: Playback, row: int, size: tuple[int, int]) -> NDArray[np.float64]:
     """Where the vertices (p, 2) of a frame are in a picture (width, height) of the 3-D view."""
-    shapes = playback.shapes()
-    center = shapes[0].mean(axis=1)  # the first shape has unit size at the origin
-    scale = 1 / np.sqrt(np.mean(np.sum((shapes[0].T - center) ** 2, axis=1)))
+    shape = playback.shapes()[row]
+    moved = playback.file.rows((entities.MESH, "Transform3D:scale"), (entities.MESH, "Transform3D:translation"))
+    scale, translation = (
+        np.reshape(moved.static(entities.MESH, f"Transform3D:{part}"), 3) for part in ("scale", "translation")
+    )
     forward = -EYE / np.linalg.norm(EYE)
     right = np.cross(forward, (0.0, -1.0, 0.0))
     right /= np.linalg.norm(right)
-    seen = (scale * (shapes[row].T - center) - EYE) @ np.stack([right, np.cross(forward, right), forward]).T
+    seen = (scale * shape.T + translation - EYE) @ np.stack([right, np.cross(forward, right), forward]).T
     focal_px = size[1] / 2 / np.tan(np.deg2rad(FIELD_OF_VIEW_DEGREES) / 2)
     return np.asarray(seen[:, :2] / seen[:, 2:] * focal_px + np.array(size) / 2)
 

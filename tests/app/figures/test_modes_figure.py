@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.figures.modes_figure import boundary, modes_figure, spectrum
+from app.figures.modes_figure import modes_figure, spectrum
 from app.recording.modes import AMPLITUDE, View, brightness, displaced
+from reconstruction.basis.mesh import boundary
 from reconstruction.basis.modal_basis import ModalBasis
 from reconstruction.basis.modes import modal_basis
 from tests.synthetic_run import MODES, Run

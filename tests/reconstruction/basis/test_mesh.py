@@ -16,6 +16,7 @@ from reconstruction.basis.mesh import (
     smallest_angle,
     triangulate,
     unique_edges,
+    without_strays,
 )
 from tests.reconstruction.world import SEEDS, spread
 
@@ -132,3 +133,37 @@ def test_mesh_of_faces_has_their_edges() -> None:
     assert isinstance(mesh, Mesh)
     assert mesh.faces.dtype == np.int64
     assert mesh.edges.tolist() == [[0, 1], [0, 2], [1, 2]]
+
+
+def test_vertices_at_the_border_that_are_hardly_ever_seen_are_left_out() -> None:
+    rng = np.random.default_rng(0)
+    points = np.stack(np.meshgrid(np.arange(8.0), np.arange(6.0)), axis=-1).reshape(-1, 2)
+    beside = np.array([[9.0, 2.4], [3.3, 2.6]])  # out on the right, and within
+    mesh = triangulate(np.concatenate([points, beside]))
+    seen = rng.random((30, 50)) < 0.95
+    seen[:, 48:] = rng.random((30, 2)) < 0.1
+    left = without_strays(mesh, seen)
+    assert set(range(50)) - set(left.vertices.tolist()) == {48}
+    assert set(map(tuple, left.faces.tolist())) < set(map(tuple, mesh.faces.tolist()))
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 1.0])
+def test_vertices_that_are_missing_by_chance_stay(share: float) -> None:
+    rng = np.random.default_rng(0)
+    mesh = triangulate(rng.random((200, 2)))
+    left = without_strays(mesh, rng.random((30, 200)) < share)
+    assert len(left.vertices) >= 199
+
+
+def test_a_part_that_turns_away_stays() -> None:
+    points = np.stack(np.meshgrid(np.arange(9.0), np.arange(6.0)), axis=-1).reshape(-1, 2)
+    mesh = triangulate(points)
+    seen = np.ones((30, 54), np.bool_)
+    seen[8:, points[:, 0] > 4] = False
+    assert np.array_equal(without_strays(mesh, seen).faces, mesh.faces)
+
+
+def test_a_mesh_alone_has_its_vertices_only() -> None:
+    mesh = mesh_from_faces(np.array([[2, 5, 7], [5, 8, 7]]))
+    assert mesh.vertices.tolist() == [2, 5, 7, 8]
+    assert mesh.alone().faces.tolist() == [[0, 1, 2], [1, 3, 2]]
