@@ -1,7 +1,6 @@
 """Strain and curvature of a surface, vertex by vertex: what mechanics asks for."""
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from reconstruction.arrays import Array, Indices
 
@@ -19,6 +18,8 @@ class Surface:
     def __init__(self, rest: Array, faces: Indices) -> None:
         self._faces = faces
         self._rest_inverse, self._area = inverses(flattened(rest, faces))
+        from scipy.spatial import cKDTree  # takes its time to load, and few ask
+
         near = cKDTree(rest.T).query(rest.T, min(NEIGHBOURS + 1, rest.shape[1]))[1]
         self._near: Indices = np.asarray(near, np.int64)
 

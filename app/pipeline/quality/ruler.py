@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
-from scipy.spatial import Delaunay
 
 from app.arrays import Array, Indices
 from app.terminal.errors import UsageError
@@ -56,6 +55,8 @@ def ruler(size_mm: float, ends_px: Array | None, points_px: Array) -> Ruler:
     """
     ends = longest_side(points_px) if ends_px is None else ends_px
     size = float(np.ptp(points_px, axis=0).max())
+    from scipy.spatial import Delaunay  # takes its time to load, and few ask
+
     mesh = Delaunay(points_px)
     for x, y in ends:
         off = float(np.linalg.norm(points_px - (x, y), axis=1).min())

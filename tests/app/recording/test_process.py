@@ -85,7 +85,7 @@ def test_it_loads_no_command_line_and_draws_no_figures() -> None:
     code = "import sys, app.recording.process, app.recording.recording; print(*sys.modules)"
     command, root = [sys.executable, "-c", code], Path(__file__).parents[3]
     loaded = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    assert not {"matplotlib", "tyro", "app.commands", "app.options"} & set(loaded.stdout.split())
+    assert not {"matplotlib", "scipy", "tyro", "app.commands", "app.options"} & set(loaded.stdout.split())
 
 
 def test_what_nobody_reads_needs_no_process(run: Run) -> None:
