@@ -16,14 +16,17 @@ class Parts:
         recorder: writes them.
         path: of the first; None writes none.
         output: says when another is due, and where to watch.
+        wide: px of the pictures as they are kept.
         log: where to report.
 
     Attributes:
         paths: of the files so far.
     """
 
-    def __init__(self, recorder: Recorder, path: Path | None, output: Output, log: Callable[[str], None]) -> None:
-        self._recorder, self._path, self._output = recorder, path, output
+    def __init__(
+        self, recorder: Recorder, path: Path | None, output: Output, wide: int, log: Callable[[str], None]
+    ) -> None:
+        self._recorder, self._path, self._output, self._wide = recorder, path, output, wide
         self._viewer = opened_viewer(path, output, log)
         self.paths: list[Path] = []
         self._opened_s = 0.0
@@ -32,6 +35,7 @@ class Parts:
         """Go on in another file, with options as `Recording` takes them."""
         self._opened_s = time_s
         path, part = self._path, len(self.paths) + 1
+        options = {**options, "image_width": min(self._output.image_width or self._wide, self._wide)}
         if path is not None and part > 1:
             if options["image"] == "video":  # the video file is in the first part
                 options = {**options, "image": "jpeg"}

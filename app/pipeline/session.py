@@ -9,7 +9,6 @@ from typing import Literal
 
 from threadpoolctl import threadpool_limits
 
-from app.arrays import Image
 from app.files.names import RECORDINGS, free_name
 from app.options.run import Run
 from app.pipeline.final_pass import final_pass
@@ -20,7 +19,6 @@ from app.pipeline.processed import FrameShape, InOrder, Processed, Surface
 from app.pipeline.stages.launched import Launched
 from app.pipeline.stages.messages import Seen
 from app.pipeline.stages.stages import Stages
-from app.pipeline.stages.working_copy import resized
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.summary import Counts, RunSummary, summary_of
 from app.pipeline.tracked_object import TrackedObject
@@ -90,7 +88,7 @@ class Session:
             with stages.recording(needed=needed) as self._recording, self._progress:
                 self._watch.start()
                 self._progress.expect(self._tracking.opened.frame_count)
-                self._parts = Parts(self._recording, path, output, self._progress.log)
+                self._parts = Parts(self._recording, path, output, self._tracking.opened.kept[0], self._progress.log)
                 self.recordings = self._parts.paths
                 self._open_part(first)
                 self._recording.tell("region", first.index, first.time_s, first.begun(0).outline)
@@ -98,13 +96,9 @@ class Session:
 
     def _begun(self, seen: Seen) -> TrackedObject:
         """The first object. Raises the error if there is none."""
-        first = Frame(seen.index, seen.time_s, self._picture(seen.number))
-        frames = self._tracking.opened.frame_count
-        return TrackedObject(self._config, 0, first, seen.begun(0).points_px, self._watch, self._begin_map, frames)
-
-    def _picture(self, number: int) -> Image:
-        """The picture of a frame, as large as the source's."""
-        return resized(self._tracking.picture(number, keep=True), self._tracking.opened.size)
+        first = Frame(seen.index, seen.time_s, self._tracking.picture(seen.number, keep=True))
+        frames, points_px = self._tracking.opened.frame_count, seen.begun(0).points_px
+        return TrackedObject(self._config, 0, first, points_px, self._watch, self._begin_map, frames)
 
     def _objects(self, source: Iterator[Seen]) -> Iterator[Processed]:
         """The frames of one object after another."""
@@ -142,7 +136,7 @@ class Session:
             self._order.end(self._surface)
         phase = tracked.phase
         shapes = tracked.shape(seen.index, seen.time_s, guarded.observation)
-        self._others.look(seen, partial(self._picture, seen.number))
+        self._others.look(seen, partial(self._tracking.picture, seen.number, keep=True))
         self._tracking.send(self._others.asked(seen, tracked))  # as early as can be: it is waited for
         with self._watch.time("record"):
             self._split_recording(seen)
@@ -241,9 +235,7 @@ class Session:
 
     def _open_part(self, frame: Seen) -> None:
         """Record the object in another file from this frame on."""
-        wide = self._tracking.opened.kept[0]
-        options = {"image_width": min(self._config.output.image_width or wide, wide)}
-        self._parts.open(frame.time_s, self._object.recording_options | options)
+        self._parts.open(frame.time_s, self._object.recording_options)
         self._object.recordings += self._parts.paths[-1:]
 
     def _note(self, index: int, time_s: float, text: str, level: Literal["INFO", "WARN"] = "INFO") -> None:

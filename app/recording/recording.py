@@ -21,9 +21,8 @@ from app.recording.columns import Values, ours
 from app.recording.drawing import Shape, Tint, draw
 from app.recording.images import cropped, embedded_video, jpeg, reduced, texture
 from app.recording.modes import small_multiples
-from app.recording.placement import Placement
 from app.recording.stream import Stream
-from app.recording.styles import SEEN_RGB, coefficient_styles, model_components, points, styles, waiting_for
+from app.recording.styles import SEEN_RGB, Placement, coefficient_styles, model_components, points, styles, waiting_for
 from app.recording.viewer import running_viewer
 from app.recording.wireframe import NO_STRIPS, Strips
 from app.terminal.errors import UsageError

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 from app.arrays import Image
-from app.options.run import Run
+from app.pipeline.stages.messages import Footage
 from app.pipeline.stages.working_copy import WorkingCopy
 from tracking.region.mask import region_mask
 from tracking.region.search import Found, search
@@ -34,22 +34,22 @@ class FirstLook:
     notes: list[str]
 
 
-def first_look(config: Run, video: Video) -> FirstLook:
+def first_look(footage: Footage, video: Video) -> FirstLook:
     """Look for the surface in the first frames of a video, which are kept meanwhile, or read again if too large.
 
     Raises:
         TrackingError: no frame with texture, or a region or mask that does not fit the picture.
     """
-    copy, region = WorkingCopy.of(config, video.size), region_mask(video.size, config.roi, config.mask, config.outline)
+    copy, region = WorkingCopy.of(footage, video.size), region_mask(video.size, footage.roi, footage.mask, footage.outline)
     frames: Iterator[Frame] = map(copy.keep, video)
-    if not config.search or config.outline is not None:  # drawn by hand
+    if not footage.search or footage.outline is not None:  # drawn by hand
         return FirstLook(frames, region, [])
     kept = deque[Frame]()
     found = copy.found(search(copies(keeping(frames, kept, ends=video.live), copy), copy.picture(region)))
-    if config.drop_late:
+    if footage.drop_late:
         kept = deque(frame for frame in kept if frame.index >= found.first.index)
         kept = deque(list(kept)[:: len(kept) // LEADING + 1])
-    frames = chain(emptied(kept), frames) if kept else map(copy.keep, again(config))
+    frames = chain(emptied(kept), frames) if kept else map(copy.keep, again(footage))
     begun = next(frame for frame in frames if frame.index >= found.first.index)
     return FirstLook(chain([begun], frames), found.region, notes_on(found, video.first_index))
 
@@ -73,9 +73,9 @@ def emptied(kept: deque[Frame]) -> Iterator[Frame]:
         yield kept.popleft()
 
 
-def again(config: Run) -> Iterator[Frame]:
+def again(footage: Footage) -> Iterator[Frame]:
     """All frames of a file."""
-    with Video(config.source, *config.frame_range, duration_s=config.duration) as video:
+    with Video(footage.source, *footage.frame_range, duration_s=footage.duration) as video:
         yield from video
 
 

@@ -41,9 +41,9 @@ class Launched:
         elif config.jobs and not self.apart:
             self._launch()
         if self.apart:
-            from app.pipeline.stages.messages import first_asked
+            from app.pipeline.stages.messages import Footage, first_asked
 
-            for message in (config, *first_asked()):
+            for message in (Footage.of(config), *first_asked()):
                 self.tracking.send(message)
             self.recording = child("app.recording.process", self.pictures) if self._record else None
         return self

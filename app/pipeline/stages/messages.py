@@ -1,18 +1,55 @@
 """What the tracking stage is asked, and what it answers; light, so that it is asked before the rest of a run is loaded."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, get_args
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Self, get_args
 
 from reconstruction.settings import RecoveredRestShape
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from app.arrays import Array
+    from app.options.run import Run
     from tracking import TrackingError
     from tracking.guarded import Guarded
 
 LAG = 2  # frames between a frame and the first one whose tracking may know its shape: so many are on the way
 RECOVERED = get_args(RecoveredRestShape)  # rest shapes that come from the first frames
+
+
+@dataclass(frozen=True)
+class Footage:
+    """What is looked at, and what for: of a run's options those that matter to tracking.
+
+    Attributes:
+        source, frame_range, duration, drop_late: as `Video` takes them.
+        roi, mask, outline: as `region_mask` takes them.
+        search: whether the surface is looked for in that region.
+        full_size: whether pictures are taken as they are.
+        image_width: px, how wide recorded pictures are to be, if that is said.
+        points: most.
+        rest_shape: where it comes from.
+    """
+
+    source: str
+    frame_range: tuple[int, int | None] = (0, None)
+    duration: float | None = None
+    drop_late: bool = False
+    roi: tuple[int, int, int, int] | None = None
+    mask: "Path | None" = None
+    outline: tuple[float, ...] | None = None
+    search: bool = True
+    full_size: bool = False
+    image_width: int | None = None
+    points: int = 800
+    rest_shape: str = "auto"
+
+    @classmethod
+    def of(cls, run: "Run") -> Self:
+        """That of a run."""
+        shared = {one.name: getattr(run, one.name) for one in fields(cls) if one.name != "image_width"}
+        return cls(**shared, image_width=run.output.image_width)
 
 
 @dataclass(frozen=True)

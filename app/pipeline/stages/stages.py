@@ -7,6 +7,7 @@ from typing import Self
 from app.options.run import Run
 from app.pipeline.stages.launched import Launched
 from app.pipeline.stages.maps import MapProcess
+from app.pipeline.stages.messages import Footage
 from app.pipeline.stages.tracking_process import Tracking, TrackingHere, TrackingProcess
 from app.recording.process import RecordingHere, RecordingProcess
 from reconstruction.mapping.start import Start, at_once
@@ -51,7 +52,7 @@ class Stages:
                 tracking = TrackingProcess(self._launched.tracking, self._launched.pictures)
                 self.tracking = self._ends.enter_context(tracking)
             else:
-                self.tracking = self._ends.enter_context(TrackingHere(self._config))
+                self.tracking = self._ends.enter_context(TrackingHere(Footage.of(self._config)))
             self._ends = self._ends.pop_all()
         return self
 

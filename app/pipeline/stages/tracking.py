@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from app.arrays import Array, Image
 from app.files.on_disk import OnDisk
-from app.options.run import Run
 from app.pipeline.stages.first_look import first_look
-from app.pipeline.stages.messages import RECOVERED, Asked, Begun, Opened, Seen
+from app.pipeline.stages.messages import RECOVERED, Asked, Begun, Footage, Opened, Seen
 from app.pipeline.stages.working_copy import WorkingCopy
 from reconstruction.camera import Camera
 from tracking import TrackingError
@@ -28,23 +27,23 @@ class TrackingStage:
     """From what is asked to what is seen, frame by frame.
 
     Args:
-        config: source, region and number of points.
+        footage: source, region and number of points.
 
     Raises:
         TrackingError: the source cannot be read.
     """
 
-    def __init__(self, config: Run) -> None:
-        self._config = config
+    def __init__(self, footage: Footage) -> None:
+        self._footage = footage
         self._told: list[str] = []
         self.video = Video(
-            config.source,
-            *config.frame_range,
-            duration_s=config.duration,
-            drop_late=config.drop_late,
+            footage.source,
+            *footage.frame_range,
+            duration_s=footage.duration,
+            drop_late=footage.drop_late,
             log=self._told.append,
         )
-        self._copy = WorkingCopy.of(config, self.video.size)
+        self._copy = WorkingCopy.of(footage, self.video.size)
         if self._copy.factor > 1:
             followed, kept = ("{}x{}".format(*size) for size in (self._copy.size, self._copy.kept))
             self._told.append(f"pictures are recorded at {kept} px, points followed at {followed}; --full-size uses all")
@@ -67,7 +66,7 @@ class TrackingStage:
             UsageError, TrackingError: the source breaks off, or a region, mask or mesh does not fit the picture.
         """
         if self._frames is None:
-            look = first_look(self._config, self.video)
+            look = first_look(self._footage, self.video)
             self._frames, self._region = look.frames, look.region
             self._told += look.notes
         began = perf_counter()
@@ -125,7 +124,7 @@ class TrackingStage:
             region = self._looked_for(image) if self._region is None else self._region
             if region is None:
                 return None
-            points_px = first_points(self._config, image, region, self._copy)
+            points_px = first_points(self._footage, image, region, self._copy)
         except TrackingError as error:
             self._search = None
             return error
@@ -139,7 +138,7 @@ class TrackingStage:
         Raises:
             TrackingError: there are too few corners, or nothing moves.
         """
-        given = self._config
+        given = self._footage
         region = region_mask(self.video.size, given.roi, given.mask, given.outline)  # it may be anywhere in it
         if not given.search or given.outline is not None:
             return region
@@ -151,16 +150,16 @@ class TrackingStage:
         return self._copy.region(search.region_now())
 
 
-def first_points(config: Run, image: Image, region: Image, copy: WorkingCopy) -> Array:
+def first_points(footage: Footage, image: Image, region: Image, copy: WorkingCopy) -> Array:
     """The points (P, 2) px of an object that begins in a picture, by its copy, in a region (H, W) uint8 of the picture.
 
     Raises:
         UsageError, TrackingError: a mesh that does not fit the picture, or too few corners.
     """
     gray = cast(NDArray[np.uint8], cv2.cvtColor(image, cv2.COLOR_BGR2GRAY))
-    points_px = copy.in_picture(detect_corners(gray, copy.picture(region), config.points))
-    if config.rest_shape in RECOVERED:
+    points_px = copy.in_picture(detect_corners(gray, copy.picture(region), footage.points))
+    if footage.rest_shape in RECOVERED:
         return points_px
     from app.files.mesh_file import rest_of_surface  # trimesh takes its time to load
 
-    return points_px[rest_of_surface(Path(config.rest_shape), points_px, Camera())[1]]
+    return points_px[rest_of_surface(Path(footage.rest_shape), points_px, Camera())[1]]

@@ -7,9 +7,9 @@ from typing import Protocol, Self
 import cv2
 
 from app.arrays import Image
-from app.options.run import Run
-from app.pipeline.stages.messages import LAG, Asked, Opened, Seen, first_asked
+from app.pipeline.stages.messages import LAG, Asked, Footage, Opened, Seen, first_asked
 from app.pipeline.stages.tracking import TrackingStage
+from app.pipeline.stages.working_copy import resized
 from app.processes.child import connection_to_parent, inherited_file
 from app.processes.remote import Remote, serve
 from app.processes.ring import Ring
@@ -27,19 +27,19 @@ class Tracking(Protocol):
         """What the oldest frame asked for shows; None at the end of the source."""
 
     def picture(self, number: int, *, keep: bool) -> Image:
-        """The picture of one of the last frames received, by its number; one not to keep changes later."""
+        """The picture of one of the last frames received, by its number: one to keep is as large as the source's."""
 
 
 class TrackingHere:
     """The stage in this process; a context manager that closes the source.
 
     Args:
-        config: as for `TrackingStage`.
+        footage: as for `TrackingStage`.
     """
 
-    def __init__(self, config: Run) -> None:
+    def __init__(self, footage: Footage) -> None:
         self._pictures: dict[int, Image] = {}
-        self._stage = TrackingStage(config)
+        self._stage = TrackingStage(footage)
         self._waiting = deque(first_asked())
         self.opened = self._stage.opened
 
@@ -51,9 +51,9 @@ class TrackingHere:
         """Find it out."""
         return self._stage.next(self._waiting.popleft(), self._keep)
 
-    def picture(self, number: int, *, keep: bool) -> Image:  # noqa: ARG002
-        """The frame's own."""
-        return self._pictures[number]
+    def picture(self, number: int, *, keep: bool) -> Image:
+        """The frame's own, or larger."""
+        return resized(self._pictures[number], self.opened.size) if keep else self._pictures[number]
 
     def _keep(self, number: int, picture: Image) -> None:
         self._pictures.pop(number - LAG, None)
@@ -91,7 +91,7 @@ class TrackingProcess:
     def picture(self, number: int, *, keep: bool) -> Image:
         """The one in the ring, or a copy."""
         picture = self.ring.picture(number)
-        return picture.copy() if keep else picture
+        return resized(picture.copy(), self.opened.size) if keep else picture
 
     def __enter__(self) -> Self:
         return self
@@ -107,7 +107,7 @@ def main() -> None:
     stage: TrackingStage
     ring: Ring
 
-    def answer(message: Run | Asked) -> Opened | Seen | None:
+    def answer(message: Footage | Asked) -> Opened | Seen | None:
         nonlocal stage, ring
         if isinstance(message, Asked):
             return stage.next(message, ring.write)

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 
 from app.arrays import Array, Image
-from app.options.run import Run
+from app.pipeline.stages.messages import Footage
 from tracking.guarded import Guarded
 from tracking.klt import Observation
 from tracking.region.search import Found
@@ -41,9 +41,9 @@ class WorkingCopy:
         self.kept = size[0] // step, size[1] // step
 
     @classmethod
-    def of(cls, config: Run, size: tuple[int, int]) -> "WorkingCopy":
+    def of(cls, footage: Footage, size: tuple[int, int]) -> "WorkingCopy":
         """That of pictures of a size, as a run wants it."""
-        return cls(size, full=config.full_size, wide=config.output.image_width or 0)
+        return cls(size, full=footage.full_size, wide=footage.image_width or 0)
 
     def keep(self, frame: Frame) -> Frame:
         """A frame with its picture as it is kept."""

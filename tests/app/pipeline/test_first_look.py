@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.options.run import Run
 from app.pipeline.stages.first_look import first_look, keeping
+from app.pipeline.stages.messages import Footage
 from tests.tracking.region.test_search import scene
 from tracking import TrackingError
 from tracking.video import Frame, Video
@@ -41,7 +41,7 @@ def source(tmp_path: Path) -> Path:
 
 def test_the_surface_of_a_file_is_found_and_no_frame_from_there_on_is_missing(source: Path) -> None:
     with Video(str(source)) as video:
-        look = first_look(Run(str(source)), video)
+        look = first_look(Footage(str(source)), video)
         assert [frame.index for frame in look.frames] == list(range(BLACK, BLACK + 40))
     x, y, w, h = cv2.boundingRect(look.region)
     assert (abs(x - 90) < 12, abs(y - 60) < 12, abs(w - 130) < 24, abs(h - 110) < 24) == (True,) * 4
@@ -54,14 +54,14 @@ def test_of_a_live_source_too(source: Path, monkeypatch: pytest.MonkeyPatch) -> 
     with Video(str(source)) as video:
         video.live = True
         monkeypatch.setattr("app.pipeline.stages.first_look.Video", unwanted)
-        look = first_look(Run(str(source)), video)
+        look = first_look(Footage(str(source)), video)
         assert [frame.index for frame in look.frames] == list(range(BLACK, BLACK + 40))
     assert not look.region.all()
 
 
 def test_without_a_search_the_region_is_as_given(source: Path) -> None:
     with Video(str(source)) as video:
-        look = first_look(Run(str(source), roi=(10, 20, 100, 90), search=False), video)
+        look = first_look(Footage(str(source), roi=(10, 20, 100, 90), search=False), video)
         assert next(look.frames).index == 0
     assert cv2.boundingRect(look.region) == (10, 20, 100, 90)
     assert look.notes == []
@@ -70,7 +70,7 @@ def test_without_a_search_the_region_is_as_given(source: Path) -> None:
 def test_a_still_scene_says_so(tmp_path: Path) -> None:
     path = write(tmp_path / "still.avi", (frame.image for frame in scene(frames=10)))
     with Video(str(path)) as video:
-        look = first_look(Run(str(path)), video)
+        look = first_look(Footage(str(path)), video)
     assert look.region.all()
     assert look.notes == ["no surface is seen to move in 10 frames: the whole region is taken; choose by --roi X Y W H"]
 
@@ -85,11 +85,11 @@ def test_no_more_of_a_live_source_is_kept_than_there_is_memory_for(monkeypatch: 
 def test_a_file_of_large_pictures_is_read_again(source: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.pipeline.stages.first_look.MOST_BYTES", 5 * 240 * 320 * 3)
     with Video(str(source)) as video:
-        look = first_look(Run(str(source)), video)
+        look = first_look(Footage(str(source)), video)
         assert [frame.index for frame in look.frames] == list(range(BLACK, BLACK + 40))
 
 
 def test_nothing_to_follow_is_an_error(tmp_path: Path) -> None:
     path = write(tmp_path / "black.avi", [NOTHING] * 5)
     with Video(str(path)) as video, pytest.raises(TrackingError, match="corners"):
-        first_look(Run(str(path)), video)
+        first_look(Footage(str(path)), video)

@@ -15,7 +15,7 @@ from app.options.model import Model
 from app.options.retexture import Retexture
 from app.options.run import Output, Run
 from app.pipeline.session import Session
-from app.pipeline.stages.messages import Begun, Seen
+from app.pipeline.stages.messages import Begun, Footage, Seen
 from app.pipeline.stages.tracking import first_points
 from app.pipeline.stages.working_copy import WorkingCopy
 from app.pipeline.stopwatch import Stopwatch
@@ -213,7 +213,7 @@ def test_what_is_covered_has_longer_than_what_was_cut(cut: bool, wait_s: float) 
             if one in trackers:
                 objects[one] = trackers[one].track(picture, expected_px)
             else:
-                objects[one] = begun = Begun(first_points(config, picture, whole, WorkingCopy(SIZE)))
+                objects[one] = begun = Begun(first_points(Footage.of(config), picture, whole, WorkingCopy(SIZE)))
                 trackers[one] = GuardedTracker(picture, begun.points_px)
         seen = replace(lost, index=index, time_s=100.0 + wait_s - 1.0 + index / 30, objects=objects)
         successor.look(seen, partial(np.copy, picture))

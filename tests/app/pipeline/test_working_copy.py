@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from app.options.run import Run
+from app.pipeline.stages.messages import Footage
 from app.pipeline.stages.tracking import first_points
 from app.pipeline.stages.working_copy import WorkingCopy
 from tests.tracking.scene import SIZE, texture
@@ -54,7 +54,7 @@ def test_points_are_as_sure_as_in_a_small_picture() -> None:
     page = cv2.resize(texture(), size, interpolation=cv2.INTER_CUBIC)
     copy = WorkingCopy(size)
     region = np.full(size[::-1], 255, np.uint8)
-    points = first_points(Run("video.mp4", points=60), copy.picture(page), region, copy)
+    points = first_points(Footage("video.mp4", points=60), copy.picture(page), region, copy)
     tracker = GuardedTracker(copy.picture(page), copy.points(points))
     moved = copy.guarded(tracker.track(copy.picture(np.roll(page, shift, axis=1)))).observation
     off = moved.points_px[moved.visible] - points[moved.visible] - (shift, 0)

@@ -6,7 +6,7 @@ import rerun as rr
 
 from app.arrays import Array
 from app.recording import entities
-from app.recording.placement import IN_SIGHT, Placement
+from app.recording.styles import IN_SIGHT, Placement
 from reconstruction.camera import Camera
 
 CAMERA = Camera(600.0, np.array([320.0, 240.0]))
