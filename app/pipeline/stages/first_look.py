@@ -4,6 +4,9 @@ from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import cast
+
+import cv2
 
 from app.arrays import Image
 from app.pipeline.stages.messages import Footage
@@ -13,9 +16,8 @@ from tracking.region.search import Found, search
 from tracking.region.surface import Surface
 from tracking.video import Frame, Video
 
-MOST_BYTES = (
-    600 * 2**20
-)  # of the first pictures that are kept while the surface is looked for: as many as it takes of full HD
+MOST_BYTES = 300 * 2**20  # of the first pictures that are kept while the surface is looked for: all it takes of full HD
+PLAIN_PX = 1280  # of the width; wider ones are kept as videos have them, with half of the colours across and down
 LEADING = 10  # of those, when late ones are left out, lead from the first to the newest
 
 
@@ -57,9 +59,10 @@ def first_look(footage: Footage, video: Video) -> FirstLook:
 def keeping(frames: Iterator[Frame], kept: deque[Frame], *, ends: bool) -> Iterator[Frame]:
     """The frames, kept as they come; when they fill the memory there is for them, they end, or none are kept."""
     for count, frame in enumerate(frames, 1):
-        fits = count * frame.image.nbytes <= MOST_BYTES
+        packed = replace(frame, image=pack(frame.image))
+        fits = count * packed.image.nbytes <= MOST_BYTES
         if fits or ends:
-            kept.append(frame)
+            kept.append(packed)
         else:
             kept.clear()
         yield frame
@@ -70,7 +73,20 @@ def keeping(frames: Iterator[Frame], kept: deque[Frame], *, ends: bool) -> Itera
 def emptied(kept: deque[Frame]) -> Iterator[Frame]:
     """The frames; what has been taken is kept no more."""
     while kept:
-        yield kept.popleft()
+        frame = kept.popleft()
+        yield replace(frame, image=unpack(frame.image))
+
+
+def pack(image: Image) -> Image:
+    """A picture (H, W, 3) BGR in half the memory, if it is large: (3 H / 2, W)."""
+    if image.shape[1] <= PLAIN_PX or image.shape[0] % 2 or image.shape[1] % 2:
+        return image
+    return cast(Image, cv2.cvtColor(image, cv2.COLOR_BGR2YUV_I420))
+
+
+def unpack(image: Image) -> Image:
+    """The picture (H, W, 3) BGR again."""
+    return image if image.ndim == 3 else cast(Image, cv2.cvtColor(image, cv2.COLOR_YUV2BGR_I420))
 
 
 def again(footage: Footage) -> Iterator[Frame]:

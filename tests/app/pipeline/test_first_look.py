@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.pipeline.stages.first_look import first_look, keeping
+from app.pipeline.stages.first_look import first_look, keeping, pack, unpack
 from app.pipeline.stages.messages import Footage
 from tests.tracking.region.test_search import scene
 from tracking import TrackingError
@@ -93,3 +93,14 @@ def test_nothing_to_follow_is_an_error(tmp_path: Path) -> None:
     path = write(tmp_path / "black.avi", [NOTHING] * 5)
     with Video(str(path)) as video, pytest.raises(TrackingError, match="corners"):
         first_look(Footage(str(path)), video)
+
+
+@pytest.mark.parametrize(("size", "packed"), [((1920, 1080), True), ((1920, 1081), False), ((1280, 720), False)])
+def test_large_pictures_are_kept_in_half_the_memory(size: tuple[int, int], packed: bool) -> None:
+    rng = np.random.default_rng(0)
+    image = cv2.resize(rng.integers(30, 225, (27, 48, 3)).astype(np.uint8), size, interpolation=cv2.INTER_CUBIC)
+    kept = pack(image)
+    assert kept.nbytes == image.nbytes / (2 if packed else 1)
+    grays = [cv2.cvtColor(one, cv2.COLOR_BGR2GRAY).astype(int) for one in (image, unpack(kept))]
+    assert np.abs(grays[0] - grays[1]).max() <= (3 if packed else 0)
+    assert np.median(np.abs(unpack(kept).astype(int) - image)) <= (1 if packed else 0)
