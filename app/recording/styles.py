@@ -114,7 +114,7 @@ class Placement:
         if not self.begun:
             return
         boxes = np.reshape(self._boxes, (-1, 6))
-        low, high = np.percentile(boxes[:, :3], RARE, axis=0), np.percentile(boxes[:, 3:], 100 - RARE, axis=0)
+        low, high = np.nanpercentile(boxes[:, :3], RARE, axis=0), np.nanpercentile(boxes[:, 3:], 100 - RARE, axis=0)
         center, scale = (low + high) / 2, 1 / max(self._radius, *((high - low) / 2 / IN_SIGHT))
         for entity in (entities.MESH, entities.TRUTH):
             yield entity, rr.Transform3D(translation=-scale * center, scale=scale)

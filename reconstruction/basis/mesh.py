@@ -1,6 +1,7 @@
 """Triangle meshes over scattered points: Delaunay, unique edges, coarse versions, barycentric location (paper §3.1)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -23,7 +24,7 @@ class Mesh:
     faces: Indices
     edges: Indices
 
-    @property
+    @cached_property
     def vertices(self) -> Indices:
         """The points (n,) that it has triangles at, ascending."""
         return np.unique(self.faces)
