@@ -46,7 +46,7 @@ class TrackingStage:
         self._copy = WorkingCopy.of(footage, self.video.size)
         if self._copy.factor > 1:
             followed, kept = ("{}x{}".format(*size) for size in (self._copy.size, self._copy.kept))
-            self._told.append(f"pictures are kept at {kept} px, points followed at {followed}; --full-size takes all of them")
+            self._told.append(f"pictures are kept at {kept} px, points followed at {followed}: --full-size takes all")
         self._frames: Iterator[Frame] | None = None
         self._trackers: dict[int, GuardedTracker] = {}
         self._region: Image | None = None  # where the next object begins, if that is known
