@@ -10,7 +10,7 @@ from scipy.sparse.linalg import splu
 
 from app.arrays import Array, Flags, Floats, Indices, Mask
 from app.painting.shading import sampled
-from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.mesh import Mesh, neighbour_averages
 
 NODES = 450  # of the net, about
 EDGE_PX, EDGE_TRUST = 14.0, 0.03  # points so near to the outline show what is behind the sheet, too
@@ -217,11 +217,3 @@ def homography(source: Array, target: Array) -> Array:
 def mapped(points: Array, by: Array) -> Array:
     """Points (n, 2) under a homography (3, 3)."""
     return cast(Array, cv2.perspectiveTransform(points[None].astype(np.float64), by)[0])
-
-
-def neighbour_averages(mesh: Mesh, vertices: int) -> csr_array:
-    """A matrix (p, p) that replaces each vertex's value by the mean of its neighbours'."""
-    a, b = mesh.edges.T
-    degree = np.maximum(np.bincount(mesh.edges.ravel(), minlength=vertices), 1).astype(float)
-    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
-    return csr_array((1.0 / degree[rows], (rows, columns)), shape=(vertices, vertices))

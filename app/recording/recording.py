@@ -22,7 +22,7 @@ from app.recording.drawing import Shape, Tint, draw
 from app.recording.images import cropped, embedded_video, jpeg, reduced, texture
 from app.recording.modes import small_multiples
 from app.recording.stream import Stream
-from app.recording.styles import SEEN_RGB, Placement, coefficient_styles, model_components, points, styles, waiting_for
+from app.recording.styles import SEEN_RGB, Scene, coefficient_styles, model_components, points, styles, waiting_for
 from app.recording.viewer import running_viewer
 from app.recording.wireframe import NO_STRIPS, Strips
 from app.terminal.errors import UsageError
@@ -84,7 +84,7 @@ class Recording:
         self._model: Model | None = None
         self._textured: tuple[bytes, ...] | None = None
         self._undrawn = OnDisk[Shape](Model, Strips, Tint)  # an hour's would fill the memory
-        self._placement, self._stages = Placement(size), set[str]()
+        self._scene, self._stages = Scene(size), set[str]()
         self._image_size = reduced(size, image_width)
         self._wanted = configuration.get("bootstrap_frames")
 
@@ -167,8 +167,8 @@ class Recording:
             return
         assert self._model is not None
         with self._stream.frame(index, time_s):
-            if self._placement.add(estimate.shape, self._model.camera):
-                self._stream.static(self._placement.transforms())
+            if self._scene.add(estimate.shape, self._model.camera):
+                self._stream.static(self._scene.transforms())
             known: dict[str, Values] = {name: getattr(estimate, name) for name in ("quaternion", "t", "visible")}
             known |= {"s": np.array([estimate.s]), "Lambda": estimate.Lambda.ravel(), "model": np.array([self._models - 1])}
             if estimate.sigma is not None:
@@ -226,7 +226,7 @@ class Recording:
             for index, shape in self._undrawn.taken():  # there was no final pass
                 with self._stream.frame(index, shape.time_s):
                     draw(self._stream, shape)
-            self._stream.static(self._placement.transforms())
+            self._stream.static(self._scene.transforms())
         finally:
             self._stream.close(keep=keep and self._frames > 0)
 
@@ -246,4 +246,4 @@ class Recording:
         Raises:
             UsageError: it could not be written.
         """
-        self.close(keep=self._placement.begun or not failed)
+        self.close(keep=self._scene.begun or not failed)

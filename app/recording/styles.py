@@ -87,7 +87,7 @@ def coefficient_styles(modes: int) -> Iterator[tuple[str, Loggable]]:
     yield entities.SPECTRUM, [abscissa, color]
 
 
-class Placement:
+class Scene:
     """Unit size for the first shape at the origin, where the blueprint's eye looks; smaller if others leave the view.
 
     Args:

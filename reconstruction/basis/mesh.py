@@ -2,11 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 SLIVER_DEGREES = 10.0  # triangles on the border with a smaller angle bridge a dent of the outline: nothing is seen there
 CHANCE = 3.0  # standard deviations of a count that come about by chance
@@ -36,8 +40,12 @@ class Mesh:
 
 def unique_edges(faces: Indices) -> Indices:
     """Each edge of the triangles (m, 3) once, as (n, 2) pairs with the smaller index first."""
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    return np.unique(np.sort(pairs, axis=1), axis=0)
+    return np.unique(sides(faces), axis=0)
+
+
+def sides(faces: Indices) -> Indices:
+    """The sides (3 m, 2) of triangles (m, 3), one triangle's after the other's, smaller index first."""
+    return np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
 
 
 def mesh_from_faces(faces: Indices) -> Mesh:
@@ -66,8 +74,7 @@ def triangulate(points: Array) -> Mesh:
 
 def without_slivers(points: Array, faces: Indices) -> Indices:
     """Triangles (m, 3) over points (p, 2), those on the border peeled off as long as they are slivers; no point is lost."""
-    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
-    side = np.unique(sides, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    side = np.unique(sides(faces), axis=0, return_inverse=True)[1].reshape(-1, 3)
     thin = np.flatnonzero(smallest_angle(points, faces) < np.deg2rad(SLIVER_DEGREES))
     kept = np.ones(len(faces), np.bool_)
     while True:
@@ -83,8 +90,7 @@ def without_slivers(points: Array, faces: Indices) -> Indices:
 
 def boundary(faces: Indices) -> Indices:
     """Edges (n, 2) that belong to one of the triangles (m, 3) only."""
-    pairs = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    edges, count = np.unique(pairs, axis=0, return_counts=True)
+    edges, count = np.unique(sides(faces), axis=0, return_counts=True)
     return np.asarray(edges[count == 1], np.int64)
 
 
@@ -93,15 +99,23 @@ def without_strays(mesh: Mesh, seen: Mask) -> Mesh:
 
     Where the surface's contour crosses another is a corner to whoever follows corners, but it goes with neither.
     """
-    count, points = seen.sum(axis=0).astype(float), seen.shape[1]
-    i, j = mesh.edges.T
-    degree = np.maximum(np.bincount(mesh.edges.ravel(), minlength=points), 1)
-    around = (np.bincount(i, count[j], points) + np.bincount(j, count[i], points)) / degree
-    stray = np.zeros(points, np.bool_)
+    count = seen.sum(axis=0).astype(float)
+    around = neighbour_averages(mesh, len(count)) @ count
+    stray = np.zeros(len(count), np.bool_)
     stray[boundary(mesh.faces)] = True
     stray &= around - count > CHANCE * np.sqrt(around)
     faces = mesh.faces[~stray[mesh.faces].any(axis=1)]
     return mesh_from_faces(faces) if stray.any() and len(faces) else mesh
+
+
+def neighbour_averages(mesh: Mesh, vertices: int) -> "csr_array":
+    """A matrix (p, p) that replaces each vertex's value by the mean of its neighbours', 0 where it has none."""
+    from scipy.sparse import csr_array  # takes its time to load, and who only draws needs none
+
+    a, b = mesh.edges.T
+    degree = np.maximum(np.bincount(mesh.edges.ravel(), minlength=vertices), 1).astype(float)
+    rows, columns = np.concatenate([a, b]), np.concatenate([b, a])
+    return csr_array((1.0 / degree[rows], (rows, columns)), shape=(vertices, vertices))
 
 
 def smallest_angle(points: Array, faces: Indices) -> Array:

@@ -152,15 +152,18 @@ def build_model(
     """
     from reconstruction.basis.modes import modal_basis  # SciPy takes its time to load, and who only draws needs none
 
-    shape, given = rest.motion.shape, mesh
-    if mesh is None:
-        mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
-        x, y = (rest.motion.R[0] @ shape)[:2]
-        a, b, c = mesh.faces.T
-        area = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a])
-        if area.sum() > 0:  # y points down: outward normals face the camera when the image winds the other way
-            mesh = mesh_from_faces(mesh.faces[:, ::-1])
-    basis = modal_basis(shape, mesh, modes, metric)
-    return Model(
-        basis, without_strays(mesh, seen) if given is None and seen is not None else mesh, camera, float(rest.motion.s[0])
-    )
+    shape, whole = rest.motion.shape, mesh or triangulated(rest)
+    basis = modal_basis(shape, whole, modes, metric)
+    shown = whole if mesh or seen is None else without_strays(whole, seen)
+    return Model(basis, shown, camera, float(rest.motion.s[0]))
+
+
+def triangulated(rest: RestShape) -> Mesh:
+    """A mesh of a rest shape's points in its main plane, whose outward normals face the camera in the first frame."""
+    shape = rest.motion.shape
+    mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
+    x, y = (rest.motion.R[0] @ shape)[:2]
+    a, b, c = mesh.faces.T
+    area = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a])
+    # y points down: they do when the image winds the other way.
+    return mesh_from_faces(mesh.faces[:, ::-1]) if area.sum() > 0 else mesh

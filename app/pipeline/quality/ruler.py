@@ -53,10 +53,10 @@ def ruler(size_mm: float, ends_px: Array | None, points_px: Array) -> Ruler:
     Raises:
         UsageError: an end is not on the surface.
     """
-    ends = longest_side(points_px) if ends_px is None else ends_px
-    size = float(np.ptp(points_px, axis=0).max())
     from scipy.spatial import Delaunay  # takes its time to load, and few ask
 
+    ends = longest_side(points_px) if ends_px is None else ends_px
+    size = float(np.ptp(points_px, axis=0).max())
     mesh = Delaunay(points_px)
     for x, y in ends:
         off = float(np.linalg.norm(points_px - (x, y), axis=1).min())

@@ -58,15 +58,15 @@ def first_look(footage: Footage, video: Video) -> FirstLook:
 
 def keeping(frames: Iterator[Frame], kept: deque[Frame], *, ends: bool) -> Iterator[Frame]:
     """The frames, kept as they come; when they fill the memory there is for them, they end, or none are kept."""
+    full = False
     for count, frame in enumerate(frames, 1):
-        packed = replace(frame, image=pack(frame.image))
-        fits = count * packed.image.nbytes <= MOST_BYTES
-        if fits or ends:
-            kept.append(packed)
-        else:
-            kept.clear()
+        if not full:
+            kept.append(replace(frame, image=pack(frame.image)))
+            full = count * kept[-1].image.nbytes > MOST_BYTES
+            if full and not ends:
+                kept.clear()
         yield frame
-        if ends and not fits:
+        if full and ends:
             return
 
 

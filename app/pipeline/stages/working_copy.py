@@ -63,7 +63,7 @@ class WorkingCopy:
 
     def region(self, region: Image) -> Image:
         """A region (H, W) of the copy, of the picture."""
-        return cast(Image, cv2.resize(region, self._size, interpolation=cv2.INTER_NEAREST))
+        return resized(region, self._size)
 
     def guarded(self, seen: Guarded) -> Guarded:
         """What the copy shows, in the picture's pixels."""
