@@ -1,5 +1,6 @@
 """The command: `modeshape`, or `python -m modeshape`."""
 
+import atexit
 import os
 import sys
 from pathlib import Path
@@ -8,18 +9,36 @@ from typing import NoReturn
 
 def main() -> NoReturn:
     """Carry out what the command line asks for."""
+    codes: list[object] = []
+    atexit.register(leave, codes)  # before all others, so it is called after them
     try:
         isolate()
     except FileNotFoundError:
         sys.stderr.write("error: the current folder is gone: change to another\n")
         sys.exit(2)
+    from app.environment import environment
+
+    os.environ.update(environment())
     if sys.argv[1:2] == ["run"] and not {"-h", "--help", "--help-all"} & set(sys.argv):
         from app.pipeline.stages.launched import WAITING, Launched
 
         WAITING.append(Launched())
     from app.commands.cli import main as run
 
-    run()
+    try:
+        run()
+    except SystemExit as stop:
+        codes.append(stop.code)
+        raise
+
+
+def leave(codes: list[object]) -> None:
+    """End with the exit code that is known, if any: what Python would tidy up in a sixth of a second, the system does."""
+    for code in codes:
+        if isinstance(code, int):
+            sys.stdout.flush()
+            sys.stderr.flush()
+            os._exit(code)
 
 
 def isolate() -> None:

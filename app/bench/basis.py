@@ -7,7 +7,6 @@ from typing import TypeVar
 
 import numpy as np
 from scipy.linalg import eigh, subspace_angles
-from threadpoolctl import threadpool_limits
 
 from app.bench.own_process import apart
 from app.bench.timing import Log
@@ -62,13 +61,12 @@ def basis_times(*, quick: bool, log: Log) -> Iterator[BasisTime]:
 def own_times(points: int, metric: Metric) -> tuple[float, float]:
     """Seconds of distances and of eigenpairs, the ways `modal_basis` takes."""
     rest, mesh = surface_with_mesh(points)
-    with threadpool_limits(1):
-        if points > EXACT_POINTS:
-            chosen = landmarks.landmarks(rest, MODES)
-            to, build_s = clocked(lambda: distances.dissimilarity(metric, rest, mesh.edges, chosen))
-            return build_s, clocked(lambda: landmarks.eigenpairs_of(to, chosen, MODES))[1]
-        D, build_s = clocked(lambda: doubly_centred(distances.dissimilarity(metric, rest, mesh.edges)))
-        return build_s, clocked(lambda: leading_eigenpairs(D, MODES))[1]
+    if points > EXACT_POINTS:
+        chosen = landmarks.landmarks(rest, MODES)
+        to, build_s = clocked(lambda: distances.dissimilarity(metric, rest, mesh.edges, chosen))
+        return build_s, clocked(lambda: landmarks.eigenpairs_of(to, chosen, MODES))[1]
+    D, build_s = clocked(lambda: doubly_centred(distances.dissimilarity(metric, rest, mesh.edges)))
+    return build_s, clocked(lambda: leading_eigenpairs(D, MODES))[1]
 
 
 def all_eigenpairs_s(points: int, metric: Metric) -> float:

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 
 from rich.table import Table
-from threadpoolctl import threadpool_limits
 
 from app.bench import basis, end_to_end, painting, window
 from app.bench.targets import Ratios, markdown, rows
@@ -61,7 +60,7 @@ def bench(command: Bench, progress: Progress) -> Benchmarks:
     if command.readme:
         with_table(command.readme, README_TABLE, "")
     quick, log = command.quick, progress.log
-    with progress, threadpool_limits(1):  # as in a run
+    with progress:
         races = list(window.races(quick=quick, log=log))
         if races[0].ceres_ms is None:
             log("pyceres is not installed, so Ceres takes no part: pip install 'modeshape[bench]'")

@@ -3,7 +3,6 @@
 import atexit
 import contextlib
 import io
-import os
 import re
 import signal
 import sys
@@ -15,7 +14,6 @@ from typing import Annotated, Any, NoReturn
 
 import tyro
 
-from app.environment import environment
 from app.memory import keep_memory
 from app.options.batch import Batch
 from app.options.bench import Bench
@@ -58,7 +56,6 @@ Start with `modeshape demo`, then `modeshape run your_video.mp4`, or
 
 def main() -> NoReturn:
     """Entry point of the `modeshape` script; see `ExitCode` for how it ends."""
-    os.environ.update(environment())
     keep_memory()
     prepare()
     try:

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from app.figures.modes_figure import modes_figure, spectrum, title_of
 from app.files.writing import check_outputs, writable
@@ -44,7 +43,7 @@ def modes(command: Modes, progress: Progress) -> Drawn:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
     """
     check_outputs({"--out": command.out}, [command.source], overwrite=command.overwrite)
-    with threadpool_limits(1), progress:
+    with progress:
         recorded = not (command.source.is_file() and zipfile.is_zipfile(command.source))  # an .npz is one
         name, basis, mesh, metric = (of_recording if recorded else of_tracks)(command, progress)
         eigenvalues = spectrum(basis, mesh, metric)

@@ -7,8 +7,6 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from threadpoolctl import threadpool_limits
-
 from app.files.readme import put_table, with_table
 from app.options.reproduce import Reproduce
 from app.reproduce.catalog import CATALOG
@@ -69,7 +67,6 @@ def reproduce(command: Reproduce, _: Progress) -> Reproduced:
     interrupted = False
     with (
         tempfile.TemporaryDirectory() as scratch,
-        threadpool_limits(1),
         Work(command.data, Path(scratch), effort, expected_s) as work,
     ):
         for name, absent in skipped.items():

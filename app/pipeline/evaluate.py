@@ -6,7 +6,6 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from app.arrays import Array, Flags
 from app.files.mesh_file import rest_of_vertices
@@ -104,7 +103,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
     check_extent(W, visible)
     reconstruction = prepare(config, tracks)
     collected = Collected(everything=True)
-    with threadpool_limits(1), progress:
+    with progress:
         progress.expect(frames)
         started = perf_counter()
         estimates = online = reconstructed(reconstruction, W, visible, progress)

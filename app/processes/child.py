@@ -31,7 +31,7 @@ def started(module: str, *files: int) -> "subprocess.Popen[bytes]":
     """The process, with open files, by their numbers, which are its arguments."""
     return subprocess.Popen(
         [sys.executable, "-P", "-W", "ignore", "-m", module, *map(str, files)],  # -P: not the user's modules
-        env=environment() | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+        env=environment(),
         stdin=subprocess.DEVNULL,
         stdout=2,  # stderr: stdout is for the summary
         pass_fds=files,

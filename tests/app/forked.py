@@ -48,8 +48,7 @@ def loaded() -> socket.socket:
     ours, theirs = socket.socketpair()
     with theirs:
         command = [sys.executable, "-m", "tests.app.forked", str(theirs.fileno())]
-        env = environment() | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-        subprocess.Popen(command, cwd=ROOT, env=env, pass_fds=[theirs.fileno()])
+        subprocess.Popen(command, cwd=ROOT, env=environment(), pass_fds=[theirs.fileno()])
     return ours
 
 

@@ -214,7 +214,7 @@ def make_samples(folder: Path) -> None:
 
 def fuzz(samples: Path, kinds: list[str], cases: range) -> list[dict[str, object]]:
     """Those of the cases with a complaint; workers share them. `samples` is a folder of whole files."""
-    environment = completed_environment() | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    environment = completed_environment() | {"PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-m", "tests.robustness.fuzz", "--worker", str(samples), ",".join(kinds)]
     workers = [
         subprocess.Popen([*command, *numbers], cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
