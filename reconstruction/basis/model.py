@@ -106,13 +106,14 @@ class Model:
         pull = STAYS * self.B.shape[1]
         before = np.zeros((3, r)) if last is None else last.Lambda[-1]
         Lambda, middle = np.zeros((3, r)), said[:, -1:] / shown
+        held = np.linalg.inv(gram[modes, modes] + pull * np.eye(r))
         for _ in range(TURNS):
             model = np.concatenate([np.eye(3), Lambda, np.zeros((3, 1))], axis=1)  # times B: the shape by now
             centre = model @ gram[:, -1:] / shown
             R = nearest_rotation(said @ model.T - shown * middle @ centre.T)
             origin = middle - R @ centre
             wanted = R.T @ (said - origin * gram[-1])[:, modes] - gram[:3, modes] + pull * before
-            Lambda = np.linalg.solve(gram[modes, modes] + pull * np.eye(r), wanted.T).T
+            Lambda = wanted @ held
         if origin[2, 0] <= 0:
             return None
         s = camera.focal_px / (self.radius_px * origin[2, 0])

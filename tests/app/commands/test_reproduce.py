@@ -73,7 +73,7 @@ def test_real_data_give_every_table(shared_data: Path, tmp_path: Path) -> None:
     assert [len(row) for row in experiments["mode-counts"]["tables"][0]["rows"]] == [5] * 8
 
 
-@pytest.mark.slow
+@pytest.mark.whole
 def test_hard_cases_are_taken_for_what_they_are(tmp_path: Path) -> None:
     reproduced = reproduce(Reproduce(tmp_path, tmp_path / "out", only=("hard-cases",), quick=True), Progress())
     [table] = reproduced.experiments["hard-cases"]["tables"]

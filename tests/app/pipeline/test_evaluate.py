@@ -14,7 +14,7 @@ from tests.reconstruction.runs import swelling_hill
 from tracking import TrackingError
 
 MILLI, KILO = 1e-3, 1e3
-SLOW = pytest.mark.slow
+SLOW, WHOLE = pytest.mark.slow, pytest.mark.whole
 UNITS = ((MILLI, 1.0), (KILO, 1.0), (1.0, MILLI), (1.0, KILO), (MILLI, MILLI), (KILO, MILLI))  # of shapes, of images
 
 
@@ -46,10 +46,10 @@ def write_mesh(path: Path, shape: np.ndarray[tuple[int, ...], np.dtype[np.float6
         ("flag250", "first-truth", ((MILLI, 1.0), (1.0, KILO))),
         ("flag250_perspective", "mesh", ((MILLI, 1.0), (KILO, MILLI))),
         ("face37", "rigid", ((1.0, MILLI),)),
-        pytest.param("flag250", "first-truth", UNITS, marks=SLOW),
-        pytest.param("flag250_perspective", "first-truth", UNITS, marks=SLOW),
-        pytest.param("face37", "first-truth", UNITS, marks=SLOW),
-        pytest.param("face37", "rigid", UNITS, marks=SLOW),
+        pytest.param("flag250", "first-truth", UNITS, marks=WHOLE),
+        pytest.param("flag250_perspective", "first-truth", UNITS, marks=WHOLE),
+        pytest.param("face37", "first-truth", ((KILO, MILLI),), marks=SLOW),
+        pytest.param("face37", "rigid", UNITS, marks=WHOLE),
         pytest.param("face37", "auto", ((KILO, MILLI),), marks=SLOW),
         pytest.param("flag250", "auto", ((KILO, MILLI),), marks=SLOW),
         # A regular grid has ties, which rounding decides (2e-6 in the error): powers of two have none.
