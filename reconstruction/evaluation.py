@@ -66,11 +66,16 @@ def e3d(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = F
 
 
 def error_over_sigma(shapes: Array, sigma: Array, truth: Array) -> float:
-    """Errors of shapes (K, 3, n) against truth (K, 3, n) over their standard deviations (K, n); median over the frames."""
+    """Errors of shapes (K, 3, n) against truth (K, 3, n) over their standard deviations (K, n); median over the frames.
+
+    A frame whose shape was given has no uncertainty, and is not counted.
+    """
     truth = truth - truth.mean(axis=2, keepdims=True)
     placed, scale = aligned(shapes, truth)
     squares = ((placed - truth) ** 2).sum(axis=1) / scale**2
-    return float(np.median(np.sqrt(squares.mean(axis=1) / (sigma**2).mean(axis=1))))
+    variances = (sigma**2).mean(axis=1)
+    told = variances > 0
+    return float(np.median(np.sqrt(squares.mean(axis=1)[told] / variances[told])))
 
 
 def aligned(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = False) -> tuple[Array, float]:

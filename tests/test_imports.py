@@ -44,7 +44,7 @@ ARROWS = {
     "reconstruction.mapping": {"reconstruction.basis", "reconstruction.window"},
     "reconstruction.evaluation": {"reconstruction.basis"},
     "reconstruction.online": {"reconstruction.basis", "reconstruction.window", "reconstruction.mapping"},
-    "modeshape": WORKED | {"app.commands"},
+    "modeshape": WORKED | {"app.shared", "app.commands"},
 }
 TERMINAL_AND_VIEWER = {"rerun", "rerun_cli", "tyro", "rich"}
 FOREIGN = {"tracking": TERMINAL_AND_VIEWER, "reconstruction": TERMINAL_AND_VIEWER | {"cv2"}}
