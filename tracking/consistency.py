@@ -7,6 +7,7 @@ import numpy as np
 from tracking import Array, Flags, Indices
 
 NEIGHBOURS = 10  # of which a third may be wrong and six numbers are still well determined
+SPACING = 3  # the neighbour whose distance is the usual one
 STIFFNESS = 0.02  # pull towards the prior map, in units of the neighbours' mean square distance
 MIN_SUPPORT = 3.0  # sum of the neighbours' weights; below, a point is not judged
 ROUNDS = 5  # of re-weighting; 4 miss 2 % of the outliers where these are 30 % of the points, 5 miss 0.3 %
@@ -143,3 +144,9 @@ def nearest_neighbours(points_px: Array, count: int = NEIGHBOURS) -> Indices:
         order = np.argsort(np.take_along_axis(distance, nearest, axis=1), axis=1)
         rows.append(np.take_along_axis(nearest, order, axis=1)[:, 1:])
     return np.concatenate(rows).astype(np.int64)
+
+
+def spacing_px(points_px: Array) -> float:
+    """The usual distance between points (P, 2), of which there are two at least: to the third nearest, the median."""
+    far = points_px[nearest_neighbours(points_px, SPACING)[:, -1]]
+    return float(np.median(np.linalg.norm(far - points_px, axis=1)))

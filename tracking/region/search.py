@@ -1,7 +1,7 @@
 """The search for the surface in the first frames: points of the whole region are followed until enough has moved."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from tracking import Array, Flags, Image, TrackingError
 from tracking.features import detect_corners
 from tracking.flow import CONVERGED_PX, FEW_GUIDES, Grays, levels_of, lucas_kanade, returned
+from tracking.region.border import at_colours
 from tracking.region.surface import FAR_ENOUGH, Surface, middling, surfaces
 from tracking.video import Frame
 
@@ -62,6 +63,7 @@ class Search:
 
     def __init__(self, image_bgr: Image, region: Image) -> None:
         self._region, self._grays = region, Grays.of(image_bgr)
+        self._first = self._last = image_bgr
         # Points nearer to each other are seen by the same windows: their motion blurs across borders.
         most = int(np.clip(np.count_nonzero(region) // WINDOW_PX**2, FEWEST, POINTS))
         self._tracks = [detect_corners(self._grays.full, region, most)]
@@ -93,6 +95,7 @@ class Search:
     def add(self, image_bgr: Image) -> bool:
         """Look at the next frame; False if most points are lost, or it is much clearer: nothing of it is kept."""
         before, self._grays, last = self._grays, Grays.of(image_bgr), self._tracks[-1]
+        self._last = image_bgr
         moved, seen = np.full_like(last, np.nan), np.flatnonzero(np.isfinite(last[:, 0]))
         if len(seen):
             there, good = followed(before, self._grays, last[seen])
@@ -106,9 +109,9 @@ class Search:
         self._way = np.fmax(self._way, np.linalg.norm(moved - self._tracks[0], axis=1))
         return True
 
-    def surfaces(self) -> list[Surface]:
-        """What moves, by the frames so far, the best first; where it was in the first of them."""
-        return surfaces(compared(self._tracks), self._region)
+    def found(self) -> tuple[Image, list[Surface]]:
+        """Where what moves most was in the first frame, (H, W) uint8, and all that moves, by the frames so far."""
+        return found(self._tracks, self._region, self._first)
 
     def region_now(self) -> Image:
         """Where what moves most is in the last frame, (H, W) uint8.
@@ -117,11 +120,10 @@ class Search:
             TrackingError: nothing moves.
         """
         last = np.isfinite(self._tracks[-1][:, 0])
-        moving = surfaces(compared([seen[last] for seen in reversed(self._tracks)]), self._region)
+        region, moving = found([seen[last] for seen in reversed(self._tracks)], self._region, self._last)
         if not moving:
             raise TrackingError(f"nothing moves in {self.frames} frames")
-        part = narrowed(self._region, moving[0])
-        return self._region if part is None else part
+        return region
 
     def _contrast_now(self) -> float:
         """Standard deviation of the grey levels in the region."""
@@ -134,10 +136,24 @@ def compared(tracks: list[Array]) -> Array:
     return np.stack([tracks[k] for k in chosen])
 
 
-def narrowed(region: Image, surface: Surface) -> Image | None:
-    """The part of a region (H, W) uint8 where a surface is; None where hardly anything of it is of something else."""
-    left_out = ~surface.own if region.all() else surface.other  # nobody has chosen a picture's corners
-    return surface.mask if float(left_out.mean()) > LEFT_OUT else None
+def found(tracks: list[Array], region: Image, image_bgr: Image) -> tuple[Image, list[Surface]]:
+    """What moves in a region (H, W) uint8, the best first, and the part of the region where that is.
+
+    That is the whole region, where nothing moves or hardly anything of it is of something else.
+
+    Args:
+        tracks: of points (P, 2) px each, the first in the picture whose region it is.
+        region: (H, W) uint8.
+        image_bgr: (H, W, 3) uint8, that picture.
+    """
+    moving = surfaces(compared(tracks), region)
+    if moving:
+        best = moving[0]
+        left_out = ~best.own if region.all() else best.other  # nobody has chosen a picture's corners
+        if float(left_out.mean()) > LEFT_OUT:
+            moving[0] = best = replace(best, mask=at_colours(best.mask, image_bgr, tracks[0][best.own]) & region)
+            return best.mask, moving
+    return region, moving
 
 
 def followed(before: Grays, now: Grays, points_px: Array) -> tuple[Array, Flags]:
@@ -193,9 +209,6 @@ def search(frames: Iterable[Frame], region: Image) -> Found:
     if begun is None:
         raise blank
     looked, first = begun
-    moving = looked.surfaces()
-    if not moving:
-        return Found(first, region, None, [], looked.frames, narrowed=False)
-    part = narrowed(region, moving[0])
-    chosen = region if part is None else part
-    return Found(first, chosen, moving[0], moving[1:], looked.frames, part is not None)
+    part, moving = looked.found()
+    best = moving[0] if moving else None
+    return Found(first, part, best, moving[1:], looked.frames, narrowed=part is not region)

@@ -7,14 +7,13 @@ import cv2
 import numpy as np
 
 from tracking import Array, Flags, Floats, Image
-from tracking.consistency import nearest_neighbours
+from tracking.consistency import spacing_px
 from tracking.region.groups import groups_of
 
 STILL_PX = 2.0  # a group that moves less does not move
 BESIDE = 8  # points of the surface that say where a point beside them should go
 STRAY_PX = 3.0  # a point no farther from where the surface would carry it is not of something else, and ...
 SHARED = 0.5  # ... one that goes so much of its way: a lip or a chin goes farther, what is behind stays
-SPACING = 3  # the neighbour whose distance is the usual one
 REACH = 1.0  # times the usual distance between points on it, that the surface goes on beyond them
 GAP = 2.0  # the same: narrower gaps between its parts are its own
 FAR_ENOUGH = 0.05  # of the picture's larger side: what has moved so far in a region that was drawn has moved
@@ -120,8 +119,7 @@ def surface_mask(place: Array, own: Flags, others: Flags, region: Image) -> Imag
         others: (P,) points that are not.
         region: (H, W) uint8, 255 where it may be.
     """
-    points = place[own]
-    spacing = float(np.median(np.linalg.norm(points[nearest_neighbours(points, SPACING)[:, -1]] - points, axis=1)))
+    spacing = spacing_px(place[own])
     to_own, to_other = (distance_to(place[which], region.shape[:2]) for which in (own, others))
     nearer = np.asarray(to_own <= to_other, np.uint8)
     near = nearer * (to_own < REACH * spacing)

@@ -15,7 +15,7 @@ from app.arrays import Flags
 from reconstruction.basis.rest_shape import rms_radius
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.isometric.sheet import IsometricSheet
-from reconstruction.mapping.map import Map
+from reconstruction.mapping.map import FEWEST_POINTS, Map
 from reconstruction.mapping.solid.solid import relief
 
 Grade = Literal["good", "fair", "poor"]
@@ -81,6 +81,13 @@ class Verdict:
     def line(self) -> str:
         """`poor: 4.5 px from frame 115 on; …`."""
         return f"{self.grade}: {self.reason}"
+
+
+MIRRORED = Verdict(
+    "fair",
+    "without perspective a bend and its mirror image look alike, so some frames may bend the other way; "
+    "give the camera: K in the file, or --focal",
+)
 
 
 def verdict(course: Course, found: Map | None, bits_per_px: float | None = None) -> Verdict:
@@ -176,12 +183,17 @@ def seen(course: Course) -> Iterator[Verdict]:
 
 def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     """What keyframes say; that there are none goes without saying where something worse is known."""
+    count = found.rest.motion.shape.shape[1]
+    if count < FEWEST_POINTS:
+        yield Verdict("fair", f"known by {count} points: what it does between them is a guess; follow more")
     if found.evidence is None:
         if found.rest.kind in RECOVERED and not known:
             yield Verdict(
                 "fair",
                 "only the first frames say what it is, depth may be a guess; film it turning or bending more, from near by",
             )
+        if found.rest.kind not in RECOVERED and found.rest.flat and not found.camera.perspective:
+            yield MIRRORED
         return
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
@@ -200,8 +212,7 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
 def of_sheet(found: IsometricSheet, *, perspective: bool) -> Iterator[Verdict]:
     """What a sheet's lengths, points and camera say."""
     if not perspective:
-        told = "without perspective a bend and its mirror image look alike, so some frames may bend the other way"
-        yield Verdict("fair", f"{told}; give the camera: K in the file, or --focal")
+        yield MIRRORED
     count = int(np.median((found.warps.weights > 0).sum(axis=1)))
     if count < FEW_POINTS:
         yield Verdict("fair", f"a sheet by {count} points a frame: what it does between them is a guess; follow more")

@@ -15,7 +15,7 @@ from reconstruction.mapping.map import Map
 from reconstruction.mapping.selection import Evidence, Misfit
 from reconstruction.mapping.solid.solid import relief
 
-REST = RestShape("rigid", RigidMotion(100 * np.eye(3, 9), np.eye(3)[None], np.ones(1), np.zeros((1, 2))), "")
+REST = RestShape("rigid", RigidMotion(100 * np.tile(np.eye(3, 9), 3), np.eye(3)[None], np.ones(1), np.zeros((1, 2))), "")
 LEFT = Misfit(0.3, 0.3)
 EVIDENCE = Evidence("solid", LEFT, LEFT, LEFT, 0.005, 2.0, 30.0, relief(REST.motion.shape))
 SOLID = Map(REST, Camera(), evidence=EVIDENCE)
@@ -54,6 +54,27 @@ def test_nothing_known_but_the_first_frames() -> None:
     said = verdict(course([0.001] * 50), replace(SOLID, evidence=None))
     assert said.grade == "fair"
     assert "film it" in said.reason
+
+
+GIVEN = replace(SOLID, evidence=None, rest=replace(REST, kind="truth"))
+
+
+@pytest.mark.parametrize("found", [SOLID, GIVEN], ids=["own", "given"])
+def test_what_few_points_carry_is_a_guess(found: Map) -> None:
+    assert verdict(course([0.001] * 50), found).grade == "good"
+    few = replace(found.rest, motion=replace(REST.motion, shape=REST.motion.shape[:, :15]))
+    said = verdict(course([0.001] * 50), replace(found, rest=few))
+    assert said.grade == "fair"
+    assert "by 15 points" in said.reason
+
+
+@pytest.mark.parametrize(("focal", "grade"), [(np.inf, "fair"), (500.0, "good")])
+def test_a_flat_shape_that_is_given_may_bend_the_other_way_without_perspective(focal: float, grade: str) -> None:
+    flat = replace(REST, kind="mesh", motion=replace(REST.motion, shape=REST.motion.shape * [[1.0], [1.0], [0.0]]))
+    assert flat.flat
+    said = verdict(course([0.001] * 50), replace(SOLID, rest=flat, camera=Camera(focal), evidence=None))
+    assert said.grade == grade
+    assert ("mirror image" in said.reason) == (grade == "fair")
 
 
 def test_what_may_as_well_be_something_else() -> None:

@@ -1,0 +1,52 @@
+"""The border of a surface in a picture: not half-way between its points and others, but where its colours end."""
+
+from typing import cast
+
+import cv2
+import numpy as np
+
+from tracking import Array, Flags, Image
+from tracking.consistency import spacing_px
+
+SIDE_PX = 240  # the larger side of the picture that is cut: time grows with its area
+COLOURS = 5  # that GrabCut tells on each side: so many pixels at least must be known to be there
+STEPS = 2  # of colours learned and the picture cut
+OUTSIDE, INSIDE = 1.0, 1.3  # times the usual distance between points on it, that the border may be from the rough one
+KEPT = 0.87  # of the surface's points: if fewer are left, its colours are those of what is around it
+
+
+def at_colours(mask: Image, image_bgr: Image, points_px: Array) -> Image:
+    """The surface (H, W) uint8 with its border where the colours say, by GrabCut (Rother et al., SIGGRAPH 2004).
+
+    Args:
+        mask: (H, W) uint8, 255 where it is by the motion of its points.
+        image_bgr: (H, W, 3) uint8, the picture.
+        points_px: (n, 2) points on it.
+
+    Returns:
+        The mask as it was where the colours on both sides are alike.
+    """
+    scale = min(1.0, SIDE_PX / max(mask.shape))
+    small = cv2.resize(image_bgr, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    rough = cv2.resize(mask, small.shape[1::-1], interpolation=cv2.INTER_AREA) > 127
+    inside, outside = (within(part) / (spacing_px(points_px) * scale) for part in (rough, ~rough))
+    labels = np.where(rough, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+    labels[inside > INSIDE] = cv2.GC_FGD
+    labels[outside > OUTSIDE] = cv2.GC_BGD
+    if min(np.count_nonzero(labels == sure) for sure in (cv2.GC_FGD, cv2.GC_BGD)) < COLOURS:
+        return mask
+    cv2.setRNGSeed(0)
+    learned, whole = (np.zeros((1, 13 * COLOURS)), np.zeros((1, 13 * COLOURS))), (0, 0, *small.shape[1::-1])
+    cv2.grabCut(small, labels, whole, *learned, STEPS, cv2.GC_INIT_WITH_MASK)
+    cut = np.where((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD), 255, 0).astype(np.uint8)
+    x, y = np.floor(scale * (points_px + 0.5)).astype(int).T
+    if np.mean(cut[y.clip(0, len(cut) - 1), x.clip(0, cut.shape[1] - 1)] > 0) < KEPT:
+        return mask
+    sure = cv2.erode(cut, np.ones((3, 3), np.uint8), borderValue=255)  # a pixel at the border is of both sides
+    return np.where(cv2.resize(sure, mask.shape[::-1], interpolation=cv2.INTER_LINEAR) > 127, 255, 0).astype(np.uint8)
+
+
+def within(part: Flags) -> Array:
+    """How far (H, W) px each pixel of a part (H, W) is from what is not in it; beyond the picture nothing is."""
+    framed = np.pad(part, 1).astype(np.uint8)
+    return cast(Array, cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1])
