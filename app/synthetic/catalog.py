@@ -91,6 +91,23 @@ def swelling(rng: np.random.Generator) -> Shape:
     return lambda places, time: solid.balloon(places, 0.55 - 0.4 * np.cos(3 * np.pi * time + a))
 
 
+def living(shape: Callable[[Array], Array], pull: float) -> Maker:
+    """Solids that are pulled so far at four places, of their width, again and again, each at its own pace."""
+
+    def maker(rng: np.random.Generator) -> Shape:
+        centres, ways = rng.uniform(-0.4, 0.4, (4, 2)), rng.normal(size=(4, 3))
+        ways *= pull / np.linalg.norm(ways, axis=1, keepdims=True)
+        pace, begun = rng.uniform(2, 6, 4), rng.uniform(0, 2 * np.pi, 4)
+
+        def changed(places: Array, time: float) -> Array:
+            course = np.sin(2 * np.pi * pace * time + begun)
+            return solid.pulled(shape(places), centres, course[:, None] * ways)
+
+        return changed
+
+    return maker
+
+
 def still(shape: Callable[[Array], Array]) -> Maker:
     """Things that do not change."""
     return lambda _: lambda places, _time: shape(places)
@@ -99,6 +116,11 @@ def still(shape: Callable[[Array], Array]) -> Maker:
 def flat(places: Array) -> Array:
     """A card."""
     return np.column_stack([places, np.zeros(len(places))])
+
+
+def heart(places: Array) -> Array:
+    """A dome."""
+    return solid.balloon(places, 0.8)
 
 
 SHEET_TURN, SOLID_TURN = (10.0, 25.0), (25.0, 40.0)
@@ -115,6 +137,8 @@ KINDS = {
     "box-late": Kind("solid", still(solid.box), SOLID_TURN, late=0.5),
     "head": Kind("solid", still(solid.head), SOLID_TURN),
     "head-late": Kind("solid", still(solid.head), SOLID_TURN, late=0.5),
+    "talking-head": Kind("solid", living(solid.head, 0.06), SOLID_TURN),
+    "heart": Kind("solid", living(heart, 0.1), SHEET_TURN),
     "can": Kind("solid", still(solid.can), SOLID_TURN, held_back=True),
     "balloon": Kind("", swelling, SOLID_TURN),
 }

@@ -1,4 +1,4 @@
-"""Shapes that do not change, seen from their front: box, can, head; and one that swells.
+"""Solids seen from their front: box, can, head; a balloon that swells; and what makes them live.
 
 A place is (x, y) on a rectangle of width 1; its shape is a point (x, y, z) with z to the back.
 """
@@ -9,6 +9,7 @@ from app.arrays import Array
 from app.synthetic.sheet import bent, folded
 
 ACROSS = 0.0  # bent from left to right
+PULLED = 0.18  # how far around its centre a pull reaches, of the width
 
 
 def box(places: Array) -> Array:
@@ -35,3 +36,9 @@ def balloon(places: Array, blown: float) -> Array:
     squared = (places**2).sum(axis=1)
     wider = 1 + 0.25 * blown
     return np.column_stack([places * wider, -0.4 * blown * np.exp(-squared / 0.2)])
+
+
+def pulled(points: Array, centres: Array, ways: Array) -> Array:
+    """Points (n, 3), pulled the ways (k, 3) at centres (k, 2) in the picture, and around them less and less."""
+    near = np.exp(-((points[:, None, :2] - centres) ** 2).sum(axis=2) / (2 * PULLED**2))
+    return np.asarray(points + near @ ways)

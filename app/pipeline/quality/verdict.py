@@ -11,11 +11,12 @@ from typing import Literal
 
 import numpy as np
 
-from app.arrays import Flags
+from app.arrays import Array, Flags
 from reconstruction.basis.rest_shape import rms_radius
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
+from reconstruction.mapping.selection import Evidence
 from reconstruction.mapping.solid.solid import relief
 
 Grade = Literal["good", "fair", "poor"]
@@ -34,7 +35,10 @@ MOST_STRETCH = 0.0055
 FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
-FAIR_CHANGE = 0.03  # what a solid that does not deform leaves over, over its radius: the depth of more is a guess
+# What a solid that does not deform leaves over, over its radius: by more, what changes is no longer small.
+POOR_CHANGE = 0.035
+# Of that what neighbours share, which is no noise, over the sine of its turn: as much its depth may be off, and more.
+FAIR_DEPTH = 0.0125
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
@@ -198,15 +202,25 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
-    change = found.evidence.solid.whole_px / rms_radius(found.rest.motion.shape)
-    if found.rest.kind == "rigid" and change > FAIR_CHANGE:
-        yield Verdict("fair", f"a solid that changes by {change:.0%} of its size: how deep its changes are is a guess")
-    deep, half = relief(found.rest.motion.shape), found.evidence.relief
-    if found.rest.kind == "rigid" and max(deep, half) > OTHERWISE_DEEP * min(deep, half):
-        told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"
-        yield Verdict("fair", f"{told}; film it turning more")
+    if found.rest.kind == "rigid":
+        yield from of_solid(found.rest.motion.shape, found.evidence)
     if found.sheet is not None:
         yield from of_sheet(found.sheet, perspective=found.camera.perspective)
+
+
+def of_solid(shape: Array, evidence: Evidence) -> Iterator[Verdict]:
+    """What a solid's changes, turn and depth (shape (3, p), px) say."""
+    whole, edges = np.array([evidence.solid.whole_px, evidence.solid.edges_px]) / rms_radius(shape)
+    turn = evidence.turn_degrees
+    told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
+    if whole > POOR_CHANGE:
+        yield Verdict("poor", told)
+    elif np.sqrt(max(whole**2 - edges**2, 0.0)) > FAIR_DEPTH * np.sin(np.radians(min(turn, 90.0))):
+        yield Verdict("fair", f"{told}; film it turning more")
+    deep, half = relief(shape), evidence.relief
+    if max(deep, half) > OTHERWISE_DEEP * min(deep, half):
+        told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"
+        yield Verdict("fair", f"{told}; film it turning more")
 
 
 def of_sheet(found: IsometricSheet, *, perspective: bool) -> Iterator[Verdict]:

@@ -83,10 +83,17 @@ def test_what_may_as_well_be_something_else() -> None:
     assert "depth may be a guess" in said.reason
 
 
-def test_a_solid_that_changes_much() -> None:
-    said = verdict(course([0.001] * 50), replace(SOLID, evidence=replace(EVIDENCE, solid=Misfit(3.0, 3.3))))
-    assert said.grade == "fair"
-    assert "changes by 6%" in said.reason
+@pytest.mark.parametrize(
+    ("whole_px", "edges_px", "turn_degrees", "grade"),
+    [(1.5, 0.5, 60.0, "fair"), (1.5, 0.5, 5.0, "fair"), (0.5, 0.2, 60.0, "good"), (0.5, 0.2, 5.0, "fair"),
+     (1.5, 1.5, 20.0, "good"), (3.0, 3.0, 60.0, "poor")],
+    ids=["changes", "and hardly turns", "hardly changes", "nor turns", "noise", "changes too much"],
+)  # fmt: skip
+def test_the_depth_of_a_solid_that_changes(whole_px: float, edges_px: float, turn_degrees: float, grade: str) -> None:
+    seen = replace(EVIDENCE, solid=Misfit(edges_px, whole_px), turn_degrees=turn_degrees)
+    said = verdict(course([0.001] * 50), replace(SOLID, evidence=seen))
+    assert said.grade == grade
+    assert ("how deep it is is a guess" in said.reason) == (grade != "good")
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
