@@ -40,9 +40,9 @@ def at_colours(mask: Image, image_bgr: Image, points_px: Array) -> Image:
     cv2.grabCut(small, labels, whole, *learned, STEPS, cv2.GC_INIT_WITH_MASK)
     cut = np.where((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD), 255, 0).astype(np.uint8)
     x, y = np.floor(scale * (points_px + 0.5)).astype(int).T
-    if np.mean(cut[y.clip(0, len(cut) - 1), x.clip(0, cut.shape[1] - 1)] > 0) < KEPT:
-        return mask
     sure = cv2.erode(cut, np.ones((3, 3), np.uint8), borderValue=255)  # a pixel at the border is of both sides
+    if np.mean(cut[y.clip(0, len(cut) - 1), x.clip(0, cut.shape[1] - 1)] > 0) < KEPT or not sure.any():
+        return mask
     return np.where(cv2.resize(sure, mask.shape[::-1], interpolation=cv2.INTER_LINEAR) > 127, 255, 0).astype(np.uint8)
 
 
