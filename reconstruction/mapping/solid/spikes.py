@@ -16,11 +16,12 @@ from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.mapping.solid.bundle import Bundle, derivatives
-from reconstruction.window.robust import deviation
+from reconstruction.window.robust import RAYLEIGH_MEDIAN, deviation
 
 INLIER_SIGMAS = 3.0  # of the residuals
 LIKE_VIEWS = 4.0  # views whose errors are alike, since what deforms stays so for a while: they count as one
 LEAST_SIGMA = 0.005  # of half the width: less is what anything deforms by
+LIVELY = 3.0  # times the residuals' sigma that a point's own may be: lips move more than a brow
 SHARE = 0.5  # of a point's observations that must agree with the solid
 FEWEST = 3  # of them
 ASIDE = 0.02  # weight of a point that does not move with the solid among the neighbours of one that does
@@ -45,7 +46,8 @@ def smoothed(W: Array, visible: Mask, bundle: Bundle, residual: Array) -> tuple[
     shape = axes.T @ bundle.motion.shape
     deep = float(np.sqrt(np.var(shape[:2], axis=1).mean())) / 2
     sigma = deviation(residual[visible], LEAST_SIGMA * deep)
-    agrees = visible & (np.nan_to_num(residual, nan=np.inf) < INLIER_SIGMAS * 1.2 * sigma)
+    usual = np.ma.median(np.ma.masked_invalid(residual), axis=0).filled(0.0) / RAYLEIGH_MEDIAN  # of each point
+    agrees = visible & (np.nan_to_num(residual, nan=np.inf) < INLIER_SIGMAS * 1.2 * usual.clip(sigma, LIVELY * sigma))
     count = agrees.sum(axis=0)
     sound = (count >= FEWEST) & (count >= SHARE * visible.sum(axis=0))
     information = axes.T @ point_information(W, agrees.astype(np.float64), bundle) @ axes

@@ -51,3 +51,14 @@ def test_what_stands_out_of_few_points_is_no_spike():
     W = W + rng.normal(0, 1.5, W.shape)
     solid = bundle_adjust(W, rng.random((14, 36)) > 0.4, PERSPECTIVE)
     assert shape_error(solid.shape, shape) < 0.1
+
+
+def test_what_deforms_more_than_the_rest_is_no_spike():
+    rng = np.random.default_rng(4)
+    shape = relief(rng, 150)
+    lively = np.linalg.norm(shape[:2] - shape[:2].mean(axis=1, keepdims=True), axis=0) < 0.5 * shape[:2].std()
+    shapes = np.repeat(shape[None], 24, axis=0) + rng.normal(0, 0.4, (24, 3, 150))
+    shapes[:, :, lively] += rng.normal(0, 1.5, (24, 3, 1))
+    W, _ = seen(shapes, turns(24), PERSPECTIVE)
+    solid = bundle_adjust(W, np.ones((24, 150), bool), PERSPECTIVE)
+    assert solid.trusted[lively].mean() > 0.9
