@@ -46,7 +46,7 @@ def smoothed(W: Array, visible: Mask, bundle: Bundle, residual: Array) -> tuple[
     shape = axes.T @ bundle.motion.shape
     deep = float(np.sqrt(np.var(shape[:2], axis=1).mean())) / 2
     sigma = deviation(residual[visible], LEAST_SIGMA * deep)
-    usual = np.ma.median(np.ma.masked_invalid(residual), axis=0).filled(0.0) / RAYLEIGH_MEDIAN  # of each point
+    usual = np.nanmedian(np.where(visible.any(axis=0), residual, 0.0), axis=0) / RAYLEIGH_MEDIAN  # of each point
     agrees = visible & (np.nan_to_num(residual, nan=np.inf) < INLIER_SIGMAS * 1.2 * usual.clip(sigma, LIVELY * sigma))
     count = agrees.sum(axis=0)
     sound = (count >= FEWEST) & (count >= SHARE * visible.sum(axis=0))
