@@ -141,9 +141,13 @@ def linearise(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior) -> S
     between[:, -1] = np.einsum("kcp,kdcp->pd", w[:, None] * b, B)
     points = np.einsum("kdcp,kecp->pde", w[:, None, None] * B, B)
     right_points = -np.einsum("kdcp,kcp->pd", B, weighted)
-    slope, off = off_plane(motion.shape)
-    points += prior.depth * np.outer(slope, slope)
-    right_points -= prior.depth * np.outer(off, slope)
+    off, slope, longer = off_plane(motion.shape, bundle.kappa)
+    points += prior.depth * slope[:, :, None] * slope[:, None]
+    right_points -= prior.depth * off[:, None] * slope
+    if not held:
+        views[-1, -1] += prior.depth * longer @ longer
+        right[-1] -= prior.depth * longer @ off
+        between[:, -1] += prior.depth * longer[:, None] * slope
     for fixed in FIXED:
         views[fixed], views[:, fixed], right[fixed], between[:, fixed] = 0.0, 0.0, 0.0, 0.0
         views[fixed, fixed] = 1.0

@@ -41,6 +41,20 @@ class Bundle:
         Y = self.placed() if placed is None else placed
         return np.asarray((Y[:, :2] + self.motion.t[:, :, None]) / (1 + self.kappa * Y[:, 2:]))
 
+    def centred(self) -> "Bundle":
+        """The same about the shape's middle, as large as in the first view: nothing of the images changes.
+
+        A shape half as far away and half as large looks the same, and steps may go that way for ever. The middle is that of
+        most points: single ones may be anywhere.
+        """
+        m = self.motion
+        middle = np.median(m.shape, axis=1)
+        origin = m.s[:, None] * (m.R @ middle)
+        farther = 1 + self.kappa * origin[:, 2]
+        s = m.s / farther
+        t = (m.t + origin[:, :2]) / farther[:, None]
+        return Bundle(RigidMotion(s[0] * (m.shape - middle[:, None]), m.R, s / s[0], t), self.kappa)
+
     def moved(self, poses: Array, log_kappa: float, points: Array) -> "Bundle":
         """After a step: poses (K, 6) as θ, t, log s; points (3, p)."""
         m = self.motion
@@ -80,8 +94,8 @@ class Loss:
 class Prior:
     """What is believed before: a point is not far off the shape's plane, and the focal length is about as given.
 
-    ½ depth Σ_i d_i² + ½ focal (log κ − log κ₀)², d_i the point's distance, along the first view's axis, from the
-    plane z = a x + b y + c through all.
+    ½ depth Σ_i d_i²/(1 + κ z_i)² + ½ focal (log κ − log κ₀)², d_i the point's distance, along the first view's axis, from
+    the plane z = a x + b y + c through all, by its distance from the camera: what is nearer and smaller alike gains nothing.
 
     Attributes:
         depth: weight of a depth; 0 for none.
@@ -95,19 +109,23 @@ class Prior:
 
     def value(self, bundle: Bundle) -> float:
         """The energy."""
-        _, off = off_plane(bundle.motion.shape)
+        off = off_plane(bundle.motion.shape, bundle.kappa)[0]
         change = np.log(bundle.kappa / self.kappa) if np.isfinite(self.focal) and self.kappa > 0 else 0.0
         return float(0.5 * self.depth * off @ off + (0.5 * self.focal * change**2 if change else 0.0))
 
 
-def off_plane(shape: Array) -> tuple[Array, Array]:
-    """Derivative (−a, −b, 1) and values (p,) of the distances along z of a shape (3, p) from its plane z = a x + b y + c.
+def off_plane(shape: Array, kappa: float) -> tuple[Array, Array, Array]:
+    """d/(1 + κ z) (p,) of a shape (3, p), see `Prior`; its derivatives (p, 3) by each point, plane held, and (p,) by log κ.
 
     Not along the plane's normal: a shape could lean over to come nearer to it.
     """
-    plane = np.concatenate([shape[:2], np.ones((1, shape.shape[1]))])
-    a, b, c = np.linalg.lstsq(plane.T, shape[2], rcond=None)[0]
-    return np.array([-a, -b, 1.0]), np.asarray(shape[2] - a * shape[0] - b * shape[1] - c)
+    nearness = 1 / (1 + kappa * shape[2])
+    plane = nearness * np.concatenate([shape[:2], np.ones((1, shape.shape[1])), shape[2:]])
+    a, b, c = np.linalg.lstsq(plane[:3].T, plane[3], rcond=None)[0]
+    off = plane[3] - a * plane[0] - b * plane[1] - c * plane[2]
+    slope = nearness[:, None] * np.array([-a, -b, 1.0])
+    slope[:, 2] -= kappa * nearness * off
+    return np.asarray(off), slope, np.asarray(-kappa * shape[2] * nearness * off)
 
 
 def derivatives(W: Array, bundle: Bundle) -> tuple[Array, Array, Array, Array]:

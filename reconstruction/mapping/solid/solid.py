@@ -186,14 +186,14 @@ class Build:
         prior = prior_of(bundle, h, sigma, kappa, refine=refine)
         prior = replace(prior, depth=FLAT) if self.flat else prior
         bundle, value = adjust(W, h, bundle, loss, prior, how)
-        return bundle, value / h.sum()
+        return bundle.centred(), value / h.sum()
 
 
 def prior_of(bundle: Bundle, h: Array, sigma: float, kappa: float, *, refine: bool) -> Prior:
     """Depths of half the width, the focal length as given; both as weak as so many observations of that noise."""
     shape = bundle.motion.shape
     deep = HALF_WIDTH * float(np.sqrt(np.var(shape[:2], axis=1).mean()))
-    excess = float((off_plane(shape)[1] ** 2).mean()) / deep**2
+    excess = float((off_plane(shape, bundle.kappa)[0] ** 2).mean()) / deep**2
     depth = (LOOSE + PROOF * h.sum() / len(shape.T) * excess) * (sigma / deep) ** 2
     focal = FOCAL_PROOF * h.sum() * (sigma / FOCAL_DOUBT) ** 2 if refine and kappa else np.inf
     return Prior(depth, focal, kappa)

@@ -1,4 +1,7 @@
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -71,7 +74,32 @@ def test_image_scales_with_the_unit(rng, factor):
 def test_distance_from_the_plane_does_not_see_a_slope(rng):
     shape = rng.normal(size=(3, 12))
     leaning = shape + np.array([[0.0], [0.0], [1.0]]) * (2 * shape[0] - shape[1] + 3)
-    np.testing.assert_allclose(off_plane(leaning)[1], off_plane(shape)[1], atol=1e-9)
+    np.testing.assert_allclose(off_plane(leaning, 0.0)[0], off_plane(shape, 0.0)[0], atol=1e-9)
+
+
+@given(SEEDS)
+@settings(deadline=None)
+def test_what_is_nearer_and_smaller_alike_looks_the_same_and_gains_nothing(rng):
+    bundle, prior = some(rng, kappa=0.1), Prior(3.0, np.inf, 0.1)
+    axes = replace(bundle, motion=bundle.motion.in_first_frame())
+    camera = np.array([*axes.motion.t[0], 1 / axes.kappa])[:, None]  # where it is from the shape's origin
+    shape = 0.3 * (axes.motion.shape + camera) - camera
+    near = replace(axes, motion=replace(axes.motion, shape=shape))
+    np.testing.assert_allclose(near.image()[0], axes.image()[0], atol=1e-9)
+    assert prior.value(near) == pytest.approx(prior.value(axes))
+
+
+@given(SEEDS, st.sampled_from([0.0, 0.1]))
+@settings(deadline=None)
+def test_the_middle_may_be_anywhere(rng, kappa):
+    bundle = some(rng, kappa=kappa)
+    m = bundle.motion
+    off = rng.normal(size=3)
+    elsewhere = replace(bundle, motion=replace(m, shape=m.shape + off[:, None]))
+    centred = elsewhere.centred()
+    np.testing.assert_allclose(centred.image(), elsewhere.image(), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(np.median(centred.motion.shape, axis=1), 0, atol=1e-9)
+    assert centred.motion.s[0] == 1
 
 
 def test_losses_agree_with_the_parabola_near_zero_and_not_far_out():
