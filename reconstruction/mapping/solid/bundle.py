@@ -95,7 +95,7 @@ class Prior:
     """What is believed before: a point is not far off the shape's plane, and the focal length is about as given.
 
     ½ depth Σ_i d_i²/(1 + κ z_i)² + ½ focal (log κ − log κ₀)², d_i the point's distance, along the first view's axis, from
-    the plane z = a x + b y + c through all, by its distance from the camera: what is nearer and smaller alike gains nothing.
+    the plane z = a x + b y + c through all, by the distance from the camera: to be nearer and smaller gains nothing.
 
     Attributes:
         depth: weight of a depth; 0 for none.
