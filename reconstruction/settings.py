@@ -9,7 +9,7 @@ from reconstruction import ReconstructionError
 Metric = Literal["euclidean", "manhattan", "mahalanobis", "chi-squared", "jensen-shannon"]
 MetricChoice = Literal["auto", Metric]
 Deformation = Literal["auto", "bending", "stretching", "general", "inextensible"]
-RecoveredRestShape = Literal["auto", "rigid", "plane"]
+RecoveredRestShape = Literal["auto", "solid", "sheet", "rigid", "plane"]
 FIRST_LOOKS = (10, 15, 20, 30, 45, 60)  # frames after which a first model is looked for; the last decides
 USUAL_MODES = 20
 MORE_MODES = 40  # of what deforms and is seen well
@@ -26,7 +26,8 @@ class Settings:
     """
 
     rest_shape: RecoveredRestShape = "auto"
-    """How the rest shape is found; a given one overrides it."""
+    """How the rest shape is found: by all frames, which may be told whether it is a solid or sheet; or by the first alone,
+    rigid or flat. A given one overrides it."""
     bootstrap_frames: Literal["auto"] | int = "auto"
     """Frames the rest shape comes from; auto decides from the evidence."""
     metric: MetricChoice = "auto"
@@ -57,8 +58,8 @@ class Settings:
 
     @property
     def maps(self) -> bool:
-        """Whether keyframes say what the object is: not with a chosen rest shape or the paper's energy."""
-        return self.revise and self.rest_shape == "auto" and self.energy != "paper"
+        """Whether keyframes say what the object is: not with one of the first frames or the paper's energy."""
+        return self.revise and self.rest_shape not in ("rigid", "plane") and self.energy != "paper"
 
     def __post_init__(self) -> None:
         if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:

@@ -23,7 +23,7 @@ def load_mesh(path: Path) -> tuple[Array, Mesh]:
         UsageError: missing, unreadable, or without triangles.
     """
     if not path.is_file():
-        raise UsageError(f"no mesh file {path}: give --rest-shape auto, rigid, plane, or an existing file")
+        raise UsageError(f"no mesh file {path}: give --rest-shape auto, solid, sheet, rigid, plane, or an existing file")
     try:
         loaded = trimesh.load_mesh(path, process=False)
         vertices, faces = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64)

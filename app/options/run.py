@@ -88,8 +88,9 @@ class Source:
     Pixels of the results are the pictures' either way."""
     points: int = 800
     """Most points tracked."""
-    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|PATH")] = "auto"
-    """Where the rest shape comes from: the first frames (a turning object: rigid; a flat sheet: plane), or a mesh file."""
+    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|solid|sheet|rigid|plane|PATH")] = "auto"
+    """What it is: found out (auto) or told (solid, sheet), by all frames; by the first ones alone (a turning object:
+    rigid; a flat sheet: plane); or a mesh file."""
     camera: Literal["perspective", "orthographic"] = "perspective"
     """How the picture came about."""
     place: tuple[float, ...] | None = None

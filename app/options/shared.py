@@ -30,8 +30,9 @@ class Overwrite:
 class FromTracks:
     """How given tracks are reconstructed."""
 
-    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|rigid|plane|first-truth|PATH")] = "auto"
-    """Where the rest shape of tracks comes from: the first frames, the first true shape, or a mesh file."""
+    rest_shape: Annotated[str, tyro.conf.arg(metavar="auto|solid|sheet|rigid|plane|first-truth|PATH")] = "auto"
+    """Where the rest shape of tracks comes from: all frames (auto, or told what it is: solid, sheet), the first ones alone
+    (rigid, plane), the first true shape, or a mesh file."""
     camera: Literal["auto", "perspective", "orthographic"] = "auto"
     """Auto: perspective if the tracks have K, else orthographic."""
     model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)

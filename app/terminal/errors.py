@@ -10,7 +10,7 @@ REMEDIES = {
     "frames": "see --roi, --mask and --frames",
     "metric": "for instance --metric euclidean",
     "region": "check --roi",
-    "rest_shape": "leave --rest-shape out: what turns later is found later; or give --rest-shape plane or mesh.obj",
+    "rest_shape": "give --rest-shape solid: what turns later is found later; or --rest-shape plane or mesh.obj",
     "truth": "give it to --ground-truth",
 }
 

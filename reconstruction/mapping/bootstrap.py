@@ -31,7 +31,7 @@ def bootstrap(W: Array, visible: Mask, camera: Camera, settings: Settings, last:
     """
     visible = without_outliers(W, visible)
     kind = settings.rest_shape
-    if kind == "plane":
+    if kind in ("plane", "sheet"):
         return first_map(rest_shape.plane(W, visible, camera), camera, settings)
     if kind == "rigid" and settings.bootstrap_frames != "auto":
         return first_map(rest_shape.rigid(W, visible, camera), camera, settings)

@@ -9,12 +9,12 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import triangulate, unique_edges
 from reconstruction.basis.model import Model
-from reconstruction.basis.rest_shape import Kind, RestShape, RigidMotion, rms_radius
+from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, sheet
 from reconstruction.mapping.isometric.focal import focal, under
 from reconstruction.mapping.isometric.sheet import Foreseen, IsometricSheet
-from reconstruction.mapping.selection import Evidence, select
+from reconstruction.mapping.selection import Evidence, Kind, select
 from reconstruction.mapping.solid.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.mapping.start import Start, at_once
@@ -110,6 +110,7 @@ def map_of(
     known: Array | None = None,
     start: Start = at_once,
     given: RestShape | None = None,
+    kind: Kind | None = None,
     last: bool = False,
 ) -> Map | None:
     """What keyframes W (K, 2, p) px with visibility (K, p) show, most different ones first; None where they do not tell.
@@ -122,6 +123,7 @@ def map_of(
         known: the rest shape (3, p) so far, of any size.
         start: where a part of the work is done, meanwhile.
         given: a rest shape from elsewhere, which stays. Keyframes of anything but a sheet in perspective add nothing to it.
+        kind: what it is, if that is known; its evidence is what keyframes say all the same.
         last: whether there will be no other, so that time may be spent on it.
     """
     if len(W) < FEWEST_KEYFRAMES or (given is not None and not camera.perspective):
@@ -132,18 +134,17 @@ def map_of(
         evidence = select(
             W, visible, camera, lambda parts: [through(by_part(whole(), part), W[part]) for part in parts], start
         )
-        if evidence.kind == "flat" or (given is not None and evidence.kind != "sheet"):
+        kind = kind or evidence.kind
+        if kind == "flat" or (given is not None and kind != "sheet"):
             return None
-        if evidence.kind == "sheet":
+        if kind == "sheet":
             found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=last)
         else:
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
-    found = replace(found, seen=visible)
-    if not (estimate_focal and camera.perspective):
-        return found
-    return replace(found, focal_note=f"focal length {found.camera.focal_px:.0f} px, from {len(W)} keyframes")
+    told = f"focal length {found.camera.focal_px:.0f} px, from {len(W)} keyframes"
+    return replace(found, seen=visible, focal_note=told if estimate_focal and camera.perspective else "")
 
 
 def through(found: IsometricSheet, W: Array) -> tuple[Array, Array]:
@@ -208,10 +209,10 @@ def sheet_map(
     t = (s * unit_px)[:, None] * origin[:, :2] + found.camera.center_px - camera.center_px
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, t)
     note = f"sheet from {len(shapes)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
-    kind: Kind = "isometric" if given is None else given.kind
     # Its shapes are smooth and go by lengths: there is no noise that more modes would fit, and fewer cut off its bends.
     note = note if given is None else f"{given.note}; {note}"
-    return Map(RestShape(kind, motion, note), camera, found, unit_px, MORE_MODES, evidence=evidence)
+    shape = RestShape("isometric" if given is None else given.kind, motion, note)
+    return Map(shape, camera, found, unit_px, MORE_MODES, evidence=evidence)
 
 
 def medoid(shapes: Array) -> int:
@@ -225,8 +226,6 @@ def medoid(shapes: Array) -> int:
 def completed(shape: Array, like: Array) -> Array:
     """A shape (3, p) with its unknown points, NaN, where their neighbours in another are, else at the centre."""
     unknown = np.isnan(shape[0])
-    if not unknown.any():
-        return shape
     whole = shape.copy()
     whole[:, unknown] = np.nanmean(shape, axis=1)[:, None]
     placed = unknown & np.isfinite(like[0])

@@ -34,6 +34,7 @@ FAIR_SHARE, POOR_SHARE = 0.5, 0.3
 MOST_STRETCH = 0.0055
 FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
+PLAIN = 2.0  # sureness, from which on what a thing was told to be is wrong
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 # What a solid that does not deform leaves over, over its radius: by more, what changes is no longer small.
 POOR_CHANGE = 0.035
@@ -42,6 +43,7 @@ FAIR_DEPTH = 0.0125
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
+KINDS = {"isometric": "sheet", "rigid": "solid"}  # by keyframes
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
 
 
@@ -121,7 +123,7 @@ def limits(poor: float, fair: float) -> list[tuple[Grade, float]]:
 
 def praise(course: Course, found: Map) -> str:
     """Why it is good."""
-    kind = {"isometric": "a sheet", "rigid": "a solid"}.get(found.rest.kind, "as given")
+    kind = f"a {KINDS[found.rest.kind]}" if found.rest.kind in KINDS else "as given"
     return f"{np.nanmedian(course.errors_px):.2g} px, {np.mean(course.shares):.0%} of the points seen, {kind} in many views"
 
 
@@ -199,6 +201,10 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         if found.rest.kind not in RECOVERED and found.rest.flat and not found.camera.perspective:
             yield MIRRORED
         return
+    made, says = KINDS.get(found.rest.kind), found.evidence.kind
+    if made not in (None, says):
+        grade: Grade = "poor" if found.evidence.sureness > PLAIN else "fair"
+        yield Verdict(grade, f"keyframes say that it is {says if says == 'flat' else 'a ' + says}, not a {made}")
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
@@ -233,4 +239,5 @@ def of_sheet(found: IsometricSheet, *, perspective: bool) -> Iterator[Verdict]:
     if found.strain_rms > POOR_STRAIN:
         yield Verdict("poor", f"its lengths change by {found.strain_rms:.1%}: no shapes have been found that keep them")
     elif found.stretch > MOST_STRETCH:
-        yield Verdict("fair", f"its lengths change by {found.stretch:.1%}: it stretches, has creases, or fine folds")
+        why = f"its lengths change by {found.stretch:.1%}: it stretches, has creases, or fine folds"
+        yield Verdict("fair", f"{why}; if it is a solid: --rest-shape solid")

@@ -128,7 +128,8 @@ class Sheet:
     ],
 )
 def test_a_sheet_by_its_lengths_points_and_camera(sheet: Sheet, focal_px: float, grade: str, says: str) -> None:
-    found = Map(replace(REST, kind="isometric"), Camera(focal_px), cast(IsometricSheet, sheet), evidence=EVIDENCE)
+    evidence = replace(EVIDENCE, kind="sheet")
+    found = Map(replace(REST, kind="isometric"), Camera(focal_px), cast(IsometricSheet, sheet), evidence=evidence)
     said = verdict(course([0.003] * 50), found)
     assert said.grade == grade
     assert says in said.reason
@@ -152,3 +153,10 @@ def test_hardly_any_bits() -> None:
     said = verdict(course([0.003] * 50), SOLID, 0.005)
     assert said.grade == "poor"
     assert "0.005 bits a pixel" in said.reason
+
+
+@pytest.mark.parametrize(("sureness", "grade"), [(5.0, "poor"), (1.5, "fair")])
+def test_what_it_was_told_to_be_and_is_not(sureness: float, grade: str) -> None:
+    said = verdict(course([0.003] * 50), replace(SOLID, evidence=replace(EVIDENCE, kind="sheet", sureness=sureness)))
+    assert said.grade == grade
+    assert "it is a sheet, not a solid" in said.reason

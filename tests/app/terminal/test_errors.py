@@ -15,8 +15,8 @@ from tracking import TrackingError
         (ReconstructionError("modes 40 does not fit 37 points: choose fewer", "modes"),
          "--modes 40 does not fit 37 points: choose fewer"),
         (ReconstructionError("cannot recover a rest shape: too few", "rest_shape"),
-         "cannot recover a rest shape: too few; leave --rest-shape out: what turns later is found later; "
-         "or give --rest-shape plane or mesh.obj"),
+         "cannot recover a rest shape: too few; give --rest-shape solid: what turns later is found later; "
+         "or --rest-shape plane or mesh.obj"),
         (ReconstructionError("energy paper needs an orthographic camera", "energy"),
          "--energy paper needs an orthographic camera; use --camera orthographic"),
         (TrackingError("a.mp4 is no camera", "drop_late"), "a.mp4 is no camera; leave --drop-late out"),

@@ -114,6 +114,15 @@ def test_a_solid() -> None:
     assert found.foreseen([(W[0], np.ones(120, bool))]) == [None]
 
 
+def test_what_it_is_may_be_told() -> None:
+    W, _, _ = waving()
+    found = map_of(W[::2], np.ones((FRAMES // 2, POINTS), bool), CAMERA, estimate_focal=False, kind="solid")
+    assert found is not None
+    assert found.rest.kind == "rigid"
+    assert found.evidence is not None
+    assert found.evidence.kind == "sheet"  # is said all the same
+
+
 def test_a_map_in_another_size_is_the_same_picture() -> None:
     W, _, found = waving()
     larger = found.scaled(3.0)
