@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.mapping.isometric.reference import reference_image
@@ -22,6 +23,7 @@ from reconstruction.mapping.outliers import without_outliers
 FUNCTIONS = 100  # of the field that an image is made of
 NODES = 200
 FEW = 250  # well-spread points that are enough to tell gross errors
+FEWEST = 3  # of them that each image must show
 TRIED = 8  # images by which the weight of bending is found
 FIRM = 10.0 ** np.arange(-7, 1.5, 0.5)  # weights of bending that are tried
 FIRST_FIRMNESS = 1e-5
@@ -95,11 +97,17 @@ class Warps:
 
 
 def smooth_warps(W: Array, visible: Mask) -> Warps:
-    """Smooth images of W (F, 2, p) px, by visibility (F, p)."""
+    """Smooth images of W (F, 2, p) px, by visibility (F, p).
+
+    Raises:
+        ReconstructionError: an image has hardly any points in common with the others.
+    """
     F, _, p = W.shape
     reference = reference_image(W, without_outliers(W, visible))  # one where few are seen would bend the map to it
     placed: Mask = np.isfinite(reference[0])
     few = np.flatnonzero(placed)[farthest_points(reference[:, placed].T, FEW)]
+    if visible[:, few].sum(axis=1).min() < FEWEST:
+        raise ReconstructionError(f"a keyframe shows fewer than {FEWEST} points that others show, too")
     field = smooth_field(reference[:, few[:NODES]], FUNCTIONS)
     values = np.zeros((p, len(field.stiffness)))
     values[placed] = field.at(reference[:, placed])

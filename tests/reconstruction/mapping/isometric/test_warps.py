@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from reconstruction import ReconstructionError
 from reconstruction.mapping.isometric.reference import clearest_image, median, reference_image
 from reconstruction.mapping.isometric.smooth_field import smooth_field
 from reconstruction.mapping.isometric.warps import smooth_warps
@@ -62,6 +63,14 @@ def test_an_image_of_the_surface_from_the_side_is_no_reference() -> None:
     assert clearest_image(W, visible) != 0
     warps = smooth_warps(W, visible)
     assert np.median(np.linalg.norm(warps.images() - W, axis=1)) < 1.0
+
+
+def test_an_image_that_shows_hardly_anything_is_told() -> None:
+    W, _ = waving_sheet(np.random.default_rng(3), points=120, amplitude=0.3, noise_px=0.0)
+    visible = np.ones((12, 120), bool)
+    visible[11, 2:] = False
+    with pytest.raises(ReconstructionError, match="points that others show"):
+        smooth_warps(np.where(visible[:, None], W, np.nan), visible)
 
 
 def test_what_is_far_from_all_visible_points_is_uncertain() -> None:
