@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from app.pipeline.estimates import Scores
-from app.pipeline.quality.verdict import Grade, verdict
+from app.pipeline.quality.verdict import BY_KEYFRAMES, Grade, verdict
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
 from app.terminal.exit_code import ExitCode
@@ -15,7 +15,7 @@ from app.terminal.summary import Summary, print_lines
 from tracking.capture import few_bits
 from tracking.guarded import Change, Guarded
 
-KINDS = {"isometric": "sheet", "rigid": "solid", "plane": "flat sheet", "mesh": "mesh given", "truth": "shape given"}
+KINDS = BY_KEYFRAMES | {"plane": "flat sheet", "mesh": "mesh given", "truth": "shape given"}
 
 
 @dataclass

@@ -202,9 +202,8 @@ def sheet_map(
         unit_px = ratio_of_sizes(given.motion.shape, rest)
         rest = given.motion.shape / unit_px
     poses = [nearest_rotation((S - S.mean(axis=1, keepdims=True)) @ rest[:, known].T) for S in shapes[:, :, known]]
-    origin = np.stack(
-        [S[:, known].mean(axis=1) - R @ rest[:, known].mean(axis=1) for S, R in zip(shapes, poses, strict=True)]
-    )
+    middles = [S[:, known].mean(axis=1) for S in shapes]
+    origin = np.stack([S - R @ rest[:, known].mean(axis=1) for S, R in zip(middles, poses, strict=True)])
     s = found.camera.focal_px / (unit_px * origin[:, 2])
     t = (s * unit_px)[:, None] * origin[:, :2] + found.camera.center_px - camera.center_px
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, t)
@@ -226,6 +225,8 @@ def medoid(shapes: Array) -> int:
 def completed(shape: Array, like: Array) -> Array:
     """A shape (3, p) with its unknown points, NaN, where their neighbours in another are, else at the centre."""
     unknown = np.isnan(shape[0])
+    if not unknown.any():
+        return shape
     whole = shape.copy()
     whole[:, unknown] = np.nanmean(shape, axis=1)[:, None]
     placed = unknown & np.isfinite(like[0])

@@ -16,7 +16,7 @@ from reconstruction.basis.rest_shape import rms_radius
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
-from reconstruction.mapping.selection import Evidence
+from reconstruction.mapping.selection import PLAIN, Evidence
 from reconstruction.mapping.solid.solid import relief
 
 Grade = Literal["good", "fair", "poor"]
@@ -34,7 +34,6 @@ FAIR_SHARE, POOR_SHARE = 0.5, 0.3
 MOST_STRETCH = 0.0055
 FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
-PLAIN = 2.0  # sureness, from which on what a thing was told to be is wrong
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 # What a solid that does not deform leaves over, over its radius: by more, what changes is no longer small.
 POOR_CHANGE = 0.035
@@ -43,7 +42,7 @@ FAIR_DEPTH = 0.0125
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
-KINDS = {"isometric": "sheet", "rigid": "solid"}  # by keyframes
+BY_KEYFRAMES = {"isometric": "sheet", "rigid": "solid"}  # kinds of rest shapes, in words
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
 
 
@@ -123,7 +122,7 @@ def limits(poor: float, fair: float) -> list[tuple[Grade, float]]:
 
 def praise(course: Course, found: Map) -> str:
     """Why it is good."""
-    kind = f"a {KINDS[found.rest.kind]}" if found.rest.kind in KINDS else "as given"
+    kind = f"a {BY_KEYFRAMES[found.rest.kind]}" if found.rest.kind in BY_KEYFRAMES else "as given"
     return f"{np.nanmedian(course.errors_px):.2g} px, {np.mean(course.shares):.0%} of the points seen, {kind} in many views"
 
 
@@ -201,7 +200,7 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         if found.rest.kind not in RECOVERED and found.rest.flat and not found.camera.perspective:
             yield MIRRORED
         return
-    made, says = KINDS.get(found.rest.kind), found.evidence.kind
+    made, says = BY_KEYFRAMES.get(found.rest.kind), found.evidence.kind
     if made not in (None, says):
         grade: Grade = "poor" if found.evidence.sureness > PLAIN else "fair"
         yield Verdict(grade, f"keyframes say that it is {says if says == 'flat' else 'a ' + says}, not a {made}")

@@ -154,7 +154,7 @@ def test_unknown_points_are_where_their_neighbours_are() -> None:
     whole = completed(shape, like)
     assert np.isfinite(whole).all()
     np.testing.assert_array_equal(whole[:, [0, 1, 3, 4]], shape[:, [0, 1, 3, 4]])
-    np.testing.assert_array_equal(completed(whole, like), whole)
+    assert completed(whole, like) is whole
 
 
 @pytest.mark.parametrize("step_px", [2.0, 40.0])
