@@ -9,6 +9,7 @@ from reconstruction.camera import Camera
 from reconstruction.mapping import rest_shape
 from reconstruction.mapping.evidence import TURN_DEGREES, weigh
 from reconstruction.mapping.factorization import view_turn_degrees
+from reconstruction.mapping.keyframes import FEWEST_SEEN
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.settings import Settings
@@ -29,7 +30,9 @@ def bootstrap(W: Array, visible: Mask, camera: Camera, settings: Settings, last:
     Raises:
         ReconstructionError: no rest shape can be had from them.
     """
-    visible = without_outliers(W, visible)
+    shown = visible.sum(axis=1)
+    telling = shown >= FEWEST_SEEN * shown.max()
+    W, visible = W[telling], without_outliers(W[telling], visible[telling])
     kind = settings.rest_shape
     if kind in ("plane", "sheet"):
         return first_map(rest_shape.plane(W, visible, camera), camera, settings)
@@ -37,14 +40,17 @@ def bootstrap(W: Array, visible: Mask, camera: Camera, settings: Settings, last:
         return first_map(rest_shape.rigid(W, visible, camera), camera, settings)
     doubt = "there are too few frames for a rigid shape"
     if len(W) >= FEWEST_RIGID:
-        doubt = weigh(W, visible).doubt
-        if not doubt:
-            rest = rest_shape.rigid(W, visible, camera)
-            turn = view_turn_degrees(rest.motion.R)
-            if kind == "rigid" or turn >= TURN_DEGREES:
-                return first_map(rest, camera, settings)
-            # Things that move by themselves pass for parallax until perspective is reckoned with.
-            doubt = f"the object turned {turn:.1f}° in {len(W)} frames, about {TURN_DEGREES:.0f}° are needed"
+        try:
+            doubt = weigh(W, visible).doubt
+            if not doubt:
+                rest = rest_shape.rigid(W, visible, camera)
+                turn = view_turn_degrees(rest.motion.R)
+                if kind == "rigid" or turn >= TURN_DEGREES:
+                    return first_map(rest, camera, settings)
+                # Things that move by themselves pass for parallax until perspective is reckoned with.
+                doubt = f"the object turned {turn:.1f}° in {len(W)} frames, about {TURN_DEGREES:.0f}° are needed"
+        except ReconstructionError as error:  # frames of too few points in common
+            doubt = str(error)
     if not last:
         return None
     if kind == "rigid":

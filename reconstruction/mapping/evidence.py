@@ -12,6 +12,8 @@ from reconstruction.mapping.factorization import Factorization, factorize, view_
 TURN_DEGREES = 10.0  # less turn than this and depth drowns in noise
 RELIEF_OVER_NOISE = 3.0  # third over fourth singular value of the observations
 HALVES_AGREE = 0.10  # relative difference of the shapes of even and odd frames
+FEWEST_FRAMES = 2  # that show a point to judge by
+FEWEST_SHARED = 4  # points of two frames that tell how one image becomes the other
 JUDGING_POINTS = 150  # well-spread points are enough to decide on
 STILL = 0.006  # apparent motion, beyond that of a similarity, that is not noise; of the image's RMS extent
 
@@ -62,26 +64,33 @@ def weigh(W: Array, visible: Mask) -> Evidence:
 
 def judging_points(W: Array, visible: Mask) -> Indices:
     """Indices of well-spread points that are seen often enough to judge the motion by."""
-    often = np.flatnonzero(visible.mean(axis=0) >= min(0.8, np.quantile(visible.mean(axis=0), 0.5)))
+    share = np.where(visible.sum(axis=0) >= FEWEST_FRAMES, visible.mean(axis=0), 0.0)
+    often = np.flatnonzero(share >= min(0.8, np.quantile(share[share > 0], 0.5))) if share.any() else np.arange(len(share))
     place = np.where(visible[:, None], W, 0.0).sum(axis=0) / visible.sum(axis=0).clip(1)
     return often[farthest_points(place[:, often].T, JUDGING_POINTS)]
 
 
 def image_affinities(W: Array, visible: Mask) -> tuple[Array, Array]:
-    """Affine maps (F, 2, 2) of the first image onto each, and what they leave over, (F,) RMS over the first's extent."""
-    both = (visible & visible[0]).astype(np.float64)
-    middle, size = W[0][:, visible[0]].mean(axis=1, keepdims=True), extent(W[0][:, visible[0]])
-    first = np.where(visible[0], W[0] - middle, 0.0) / size
+    """Affine maps (F, 2, 2) of one image onto each, and what they leave over, (F,) RMS over its extent.
+
+    It is the first of those that show most points. One that shares too few with it tells nothing: the identity, and 0.
+    """
+    one = int(visible.sum(axis=1).argmax())
+    both = (visible & visible[one]).astype(np.float64)
+    both[both.sum(axis=1) < FEWEST_SHARED] = 0.0
+    middle, size = W[one][:, visible[one]].mean(axis=1, keepdims=True), extent(W[one][:, visible[one]])
+    first = np.where(visible[one], W[one] - middle, 0.0) / size
     B = np.concatenate([first, np.ones((1, W.shape[2]))])
     gram = np.einsum("ip,fp,jp->fij", B, both, B, optimize=True)
     known = np.where(both[:, None] > 0, W - middle, 0.0) / size
     maps = np.linalg.solve(gram + 1e-9 * np.eye(3), np.einsum("fcp,ip->fic", known, B)).transpose(0, 2, 1)
     left = (known - maps @ B) * both[:, None]
+    maps[both.sum(axis=1) == 0] = np.eye(2, 3)
     return maps[:, :, :2], np.sqrt((left**2).sum(axis=(1, 2)) / both.sum(axis=1).clip(1))
 
 
 def apparent_change(W: Array, visible: Mask) -> float:
-    """Largest RMS motion of a frame against the first beyond a similarity, over the first's extent.
+    """Largest RMS motion of a frame against one that shows most, beyond a similarity, over the latter's extent.
 
     Turning and bending cause it.
     """
@@ -97,7 +106,7 @@ def extent(points: Array) -> float:
 
 
 def foreshortening_degrees(W: Array, visible: Mask) -> float:
-    """Turn of a flat object that would explain the strongest foreshortening against the first frame."""
+    """Turn of a flat object that would explain the strongest foreshortening against a frame that shows most."""
     values = np.linalg.svd(image_affinities(W, visible)[0], compute_uv=False)
     return float(np.rad2deg(np.arccos(np.clip(values[:, 1] / values[:, 0], 0, 1))).max())
 

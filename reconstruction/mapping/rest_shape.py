@@ -126,7 +126,7 @@ def first_image(W: Array, visible: Mask) -> Array:
         return W[0]
     known = visible.sum(axis=0) >= 2
     first = np.where(visible[0], W[0], np.nan)
-    if len(W) >= 3 and known.sum() >= 4:
+    if len(W) >= 3 and visible[:, known].sum(axis=1).min() >= 4:
         A, t, S = affine_structure(W[:, :, known], visible[:, known])
         first[:, known] = np.where(visible[0, known], W[0][:, known], A[0] @ S + t[0][:, None])
     missing = np.isnan(first[0])

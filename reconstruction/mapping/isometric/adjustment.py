@@ -117,6 +117,9 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
         found: what its keyframes say, image by image.
         W: (F, 2, p) px, its keyframes; anything where not visible.
         rounds: of shapes, then places and lengths.
+
+    Raises:
+        ReconstructionError: a part of it comes out behind the camera.
     """
     weights = found.warps.weights * found.warps.inlier / found.warps.noise_px[:, None] ** 2
     W, shapes, placed = np.where(weights[:, None] > 0, W, 0.0), found.shapes(), found.warps.placed

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FUNCTIONS, Lengths, data_normal, stepped
@@ -163,8 +164,14 @@ class IsometricSheet:
         return replace(self, warps=warps, values=values, nodes=replace(self.nodes, reference=places[:, self.nodes.points]))
 
     def with_shapes(self, shapes: Array) -> "IsometricSheet":
-        """The same with other shapes (F, 3, p) in its keyframes."""
+        """The same with other shapes (F, 3, p) in its keyframes.
+
+        Raises:
+            ReconstructionError: a part of them is behind the camera.
+        """
         few = self.warps.few
+        if (shapes[:, 2, few] <= 0).any():
+            raise ReconstructionError("the sheet comes out behind the camera: what the keyframes show is none")
         image = shapes[:, :2, few] / shapes[:, 2:, few] * self.camera.focal_px + self.camera.center_px[:, None]
         to_images, to_depths = (np.linalg.pinv(B[few]) for B in (self.warps.values, self.values))
         warps = replace(self.warps, coefficients=to_images @ image.transpose(0, 2, 1))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from reconstruction.mapping.bootstrap import bootstrap
 from reconstruction.settings import Settings
@@ -38,3 +39,20 @@ def test_a_focal_length_that_nobody_gave_is_said_to_be_assumed() -> None:
         assert found is not None
         assert found.camera.focal_px == PERSPECTIVE.focal_px
         assert ("assumed" in found.focal_note) is estimate_focal
+
+
+@pytest.mark.parametrize("seen_later", [False, True])
+def test_points_that_come_and_go_are_a_start_all_the_same(seen_later: bool) -> None:
+    """Tracks begin and end anywhere: frames of few points, and points of few frames, tell nothing, and stop nothing."""
+    W, _ = bending_sheet()
+    frames, points = len(W), W.shape[2]
+    rng = np.random.default_rng(0)
+    if seen_later:  # most points, for the first time
+        first = rng.integers(-frames // 2, 3 * frames, points)
+        visible = (np.arange(frames)[:, None] >= first) & (np.arange(frames)[:, None] < first + frames)
+    else:  # four of many points in two of the frames
+        W, visible = np.tile(W, 4) + rng.normal(0, 1, (1, 2, 4 * points)), np.ones((frames, 4 * points), bool)
+        visible[:2, 4:] = False
+    found = bootstrap(np.where(visible[:, None], W, np.nan), visible, PERSPECTIVE, Settings(), True)
+    assert found is not None
+    assert np.isfinite(found.rest.motion.shape[:, visible.any(axis=0)]).all()

@@ -151,3 +151,12 @@ def test_points_beside_seen_ones_are_known() -> None:
     x = W[0, 0]
     known = found.shape_in(W[0], x < np.quantile(x, 0.4)).known
     assert known[x < np.quantile(x, 0.42)].all()
+
+
+def test_shapes_behind_the_camera_are_no_sheet() -> None:
+    """Tracks of something else can be explained so; their logarithms of depth would be none."""
+    _, _, found = waving()
+    shapes = found.shapes()
+    shapes[3, 2] *= -1
+    with pytest.raises(ReconstructionError, match="behind the camera"):
+        found.with_shapes(shapes)
