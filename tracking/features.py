@@ -11,14 +11,15 @@ MIN_CORNERS = 12  # fewer carry no shape
 MIN_SPACING_PX = 5.0  # closer corners share most of their patch
 BORDER_PX = 10  # half a tracking window and its gradients
 BLOCK_PX = 5  # over which the structure tensor is summed
-LOCAL_QUALITY = 0.05  # of the best corner within a few spacings
+LOCAL_QUALITY, SPACINGS = 0.05, 4.0  # of the best corner within so many spacings
+FAINT_QUALITY, FAINT_SPACINGS = 0.02, 2.0  # the same, where whatever moves is to show: a face before full bookshelves, too
 # The largest response (smaller eigenvalue of the structure tensor) in a 640x480 picture of pure noise is
 # 3.4e-5 per unit of its variance; measured for deviations of 1, 3 and 10 grey levels.
 NOISE_RESPONSE = 7e-5
 NOISE_RANGE = (0.7, 12.0)  # grey levels the noise is held to: at least rounding, and fine texture is no noise
 
 
-def detect_corners(gray: Image, region: Image, max_points: int = 800) -> Array:
+def detect_corners(gray: Image, region: Image, max_points: int = 800, *, faint: bool = False) -> Array:
     """Corners (n, 2) px in the region, spread so that weakly textured parts get some too.
 
     A corner is the best of its neighbourhood, stands out of the picture's noise, and is at least some
@@ -28,6 +29,7 @@ def detect_corners(gray: Image, region: Image, max_points: int = 800) -> Array:
         gray: (H, W) uint8 picture.
         region: (H, W) uint8, points where it is not 0.
         max_points: at most so many are returned, and about as many where the texture allows.
+        faint: fainter ones, too, which are not followed so well.
 
     Raises:
         TrackingError: there are fewer than `MIN_CORNERS`.
@@ -39,7 +41,7 @@ def detect_corners(gray: Image, region: Image, max_points: int = 800) -> Array:
     area = int(np.count_nonzero(allowed))
     corners = np.empty((0, 2))
     if area:
-        quality = _quality(gray, allowed, np.sqrt(area / max_points))
+        quality = _quality(gray, allowed, np.sqrt(area / max_points), faint=faint)
         # Squares of the spacing can be packed into the area; corners fill 40-80 % of them.
         for packing in (1.3, 1.0, 0.8, 0.65):
             spacing = max(packing * np.sqrt(area / max_points), MIN_SPACING_PX)
@@ -55,12 +57,13 @@ def detect_corners(gray: Image, region: Image, max_points: int = 800) -> Array:
     return corners[:max_points]
 
 
-def _quality(gray: Image, allowed: Flags, spacing: float) -> Array:
+def _quality(gray: Image, allowed: Flags, spacing: float, *, faint: bool) -> Array:
     """The corner response (H, W) relative to the best a few spacings around; 0 where no corner may be."""
     response = cv2.cornerMinEigenVal(gray, BLOCK_PX, ksize=3)
     response[~allowed | (response < NOISE_RESPONSE * _noise(gray, allowed) ** 2)] = 0.0
-    best = cv2.dilate(response, _square(4.0 * spacing))
-    return np.where(response >= LOCAL_QUALITY * best, response / np.maximum(best, 1e-12), 0.0)
+    least, around = (FAINT_QUALITY, FAINT_SPACINGS) if faint else (LOCAL_QUALITY, SPACINGS)
+    best = cv2.dilate(response, _square(around * spacing))
+    return np.where(response >= least * best, response / np.maximum(best, 1e-12), 0.0)
 
 
 def _noise(gray: Image, allowed: Flags) -> float:

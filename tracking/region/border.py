@@ -7,9 +7,11 @@ import numpy as np
 
 from tracking import Array, Flags, Image
 from tracking.consistency import spacing_px
+from tracking.region.surface import distance_to, holding
 
 SIDE_PX = 240  # the larger side of the picture that is cut: time grows with its area
 COLOURS = 5  # that GrabCut tells on each side: so many pixels at least must be known to be there
+DENSE = 1.0  # the same: points no farther apart than twice that are one; what lies apart from most is theirs if its colours are
 STEPS = 2  # of colours learned and the picture cut
 OUTSIDE, INSIDE = 1.0, 1.3  # times the usual distance between points on it, that the border may be from the rough one
 KEPT = 0.87  # of the surface's points: if fewer are left, its colours are those of what is around it
@@ -29,9 +31,11 @@ def at_colours(mask: Image, image_bgr: Image, points_px: Array) -> Image:
     scale = min(1.0, SIDE_PX / max(mask.shape))
     small = cv2.resize(image_bgr, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     rough = cv2.resize(mask, small.shape[1::-1], interpolation=cv2.INTER_AREA) > 127
-    inside, outside = (within(part) / (spacing_px(points_px) * scale) for part in (rough, ~rough))
+    spacing, places = spacing_px(points_px) * scale, scale * (points_px + 0.5)
+    inside, outside = (within(part) / spacing for part in (rough, ~rough))
+    dense = (distance_to(places - 0.5, rough.shape) < DENSE * spacing).astype(np.uint8)
     labels = np.where(rough, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
-    labels[inside > INSIDE] = cv2.GC_FGD
+    labels[(inside > INSIDE) & (holding(dense, places - 0.5, 1.0) > 0)] = cv2.GC_FGD
     labels[outside > OUTSIDE] = cv2.GC_BGD
     if min(np.count_nonzero(labels == sure) for sure in (cv2.GC_FGD, cv2.GC_BGD)) < COLOURS:
         return mask
@@ -39,7 +43,7 @@ def at_colours(mask: Image, image_bgr: Image, points_px: Array) -> Image:
     learned, whole = (np.zeros((1, 13 * COLOURS)), np.zeros((1, 13 * COLOURS))), (0, 0, *small.shape[1::-1])
     cv2.grabCut(small, labels, whole, *learned, STEPS, cv2.GC_INIT_WITH_MASK)
     cut = np.where((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD), 255, 0).astype(np.uint8)
-    x, y = np.floor(scale * (points_px + 0.5)).astype(int).T
+    x, y = np.floor(places).astype(int).T
     sure = cv2.erode(cut, np.ones((3, 3), np.uint8), borderValue=255)  # a pixel at the border is of both sides
     if np.mean(cut[y.clip(0, len(cut) - 1), x.clip(0, cut.shape[1] - 1)] > 0) < KEPT or not sure.any():
         return mask

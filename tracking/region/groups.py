@@ -16,7 +16,7 @@ TORN_PX, TORN_SHARE = 1.5, 0.15  # or what is usual, and of how far the nearer e
 NOISE_SHARE = 1 / 3  # of that
 TORN_OF = 0.75  # of how far its ends moved apart: what bends or stretches carries on, what tears jumps
 FAR = 0.12  # of the picture's larger side: longer edges join nothing
-CORE = 0.6  # of its edges that hold, or a point joins nothing: it may slide along a border
+CORE = 0.7  # of its edges that hold, or a point joins nothing: it may slide along a border
 SEED = 5  # points of a part that may be joined to another ...
 SEAM, SEAM_HOLDS = 5, 0.5  # ... by so many edges, of which so many are not torn
 FEWEST = 15  # points of a group
@@ -62,11 +62,12 @@ def groups_of(W: Array, extent_px: float) -> Groups:
     way = farthest(moved)
     edges = delaunay_edges(W[0])
     edges = edges[np.linalg.norm(W[0][edges[:, 0]] - W[0][edges[:, 1]], axis=1) < FAR * extent_px]
-    tear, apart = tear_px(W[0], moved, edges)
+    by_end, apart = tear_px(W[0], moved, edges)
+    tear = by_end.min(axis=0)
     torn = max(TORN_PX, float(np.median(tear)))  # in blurred pictures points go this way and that
-    whole = tear < TORN_OF * (apart + NOISE_SHARE * torn)
+    whole = by_end < TORN_OF * (apart + NOISE_SHARE * torn)
     parts = firm_parts(edges, tear < torn + TORN_SHARE * way[edges].min(axis=1), len(way))
-    whole_parts = joined(absorbed(parts, edges, whole), edges, whole)
+    whole_parts = joined(absorbed(parts, edges, whole), edges, whole.any(axis=0))
     label[often], motion = numbered(whole_parts, way)
     return Groups(label, motion)
 
@@ -82,9 +83,9 @@ def farthest(moved: Array) -> Array:
 
 
 def tear_px(place: Array, moved: Array, edges: Indices) -> tuple[Array, Array]:
-    """How far an end of each edge is from where the other end's surroundings carry it, and how far the ends move apart.
+    """How far ends of edges are from where the surroundings of the other ends carry them, and how far both move apart.
 
-    Of both ends the nearer, of all frames the most, (n,) px each.
+    The former (2, n) px by the surroundings of the first ends and of the second, the latter (n,) px; of all frames the most.
 
     Args:
         place: (P, 2) px.
@@ -94,8 +95,8 @@ def tear_px(place: Array, moved: Array, edges: Indices) -> tuple[Array, Array]:
     slope = local_slope(place, moved)
     i, j = edges.T
     gap, gain = place[j] - place[i], moved[:, j] - moved[:, i]
-    off = np.minimum(*(np.linalg.norm(gain - np.einsum("fncd,nd->fnc", slope[:, k], gap), axis=2) for k in (i, j)))
-    return most(off), most(np.linalg.norm(gain, axis=2))
+    off = [most(np.linalg.norm(gain - np.einsum("fncd,nd->fnc", slope[:, k], gap), axis=2)) for k in (i, j)]
+    return np.stack(off), most(np.linalg.norm(gain, axis=2))
 
 
 def most(values: Array) -> Array:
@@ -158,9 +159,12 @@ def firm_parts(edges: Indices, holds: Flags, count: int) -> Indices:
 
 
 def absorbed(part: Indices, edges: Indices, whole: Flags) -> Indices:
-    """Parts (P,), points without one (-1) added to where most of their edges (n, 2) lead to, if those are whole (n,)."""
+    """Parts (P,), points without one (-1) added to where most of their edges (n, 2) lead to, if those are whole (2, n).
+
+    By the surroundings of the other end, that is: those of a point beside all others explain anything.
+    """
     part, ends = part.copy(), np.concatenate([edges, edges[:, ::-1]])
-    whole = np.tile(whole, 2)
+    whole = np.concatenate([whole[1], whole[0]])
     while True:
         out = (part[ends[:, 0]] < 0) & (part[ends[:, 1]] >= 0)
         pairs, which = np.unique(np.stack([ends[out, 0], part[ends[out, 1]]], axis=1), axis=0, return_inverse=True)

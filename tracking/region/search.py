@@ -66,7 +66,7 @@ class Search:
         self._first = self._last = image_bgr
         # Points nearer to each other are seen by the same windows: their motion blurs across borders.
         most = int(np.clip(np.count_nonzero(region) // WINDOW_PX**2, FEWEST, POINTS))
-        self._tracks = [detect_corners(self._grays.full, region, most)]
+        self._tracks = [detect_corners(self._grays.full, region, most, faint=True)]
         self._way = np.zeros(len(self._tracks[0]))  # of each point so far, at most
         middle = middling(self._tracks[0], region) >= MIDDLE
         self._middle = middle if middle.any() else ~middle
