@@ -54,6 +54,23 @@ def test_points_on_the_contour_are_left_out_and_those_of_the_surface_kept() -> N
     assert found[y, x][np.linalg.norm(points - CENTRE, axis=1) < RADIUS - 6].all()
 
 
+@pytest.mark.parametrize("its_own", [True, False])
+def test_what_lies_apart_is_the_surfaces_if_its_colours_are(its_own: bool) -> None:
+    """A hand that holds it, beyond a margin without points, or its own corner."""
+    hand = (slice(100, 140), slice(245, 290))
+    image = picture(SKIN, BLUE)
+    image[hand] = image[100:140, 130:175] if its_own else image[100:140, 20:65] // 2
+    image[hand[0], 205:245] = SKIN
+    rough = disc(RADIUS)
+    rough[100:140, 150:290] = 255
+    image[:60, :60] = image[:60, :60] // 2  # and another hand, which does not move
+    x, y = np.meshgrid([255, 267, 280], [110, 125])
+    held = np.column_stack([x.ravel(), y.ravel()]).astype(np.float64)
+    found = at_colours(rough, image, np.concatenate([grid(RADIUS), held]))
+    x, y = held.astype(int).T
+    assert (found[y, x] > 0).mean() == pytest.approx(float(its_own), abs=0.2)
+
+
 def test_colours_that_cut_the_surface_are_not_believed() -> None:
     rough = disc(RADIUS)
     image = np.full((240, 320, 3), 90, np.uint8)

@@ -37,6 +37,18 @@ def test_what_moves_before_a_still_wall_is_a_group_of_its_own() -> None:
     np.testing.assert_allclose(found.motion_px, [0.4, 13.0], atol=0.6)
 
 
+def test_a_point_of_the_wall_that_is_alone_beside_what_moves_does_not_join_it() -> None:
+    """All its neighbours are on one side, where any motion is explained by a steep slope."""
+    points = grid()
+    sheet = (np.abs(points - [200, 150]) < [90, 70]).all(axis=1)
+    alone = np.array([[315.0, y] for y in (100, 150, 200)])
+    points = np.concatenate([points[sheet], alone])
+    own = np.arange(len(points)) < sheet.sum()
+    found = groups_of(tracks(points, np.where(own[:, None], [0.0, 30.0], 0.0)), EXTENT)
+    assert (found.label[own] == 0).mean() > 0.8
+    assert (found.label[~own] == -1).all()
+
+
 def test_a_surface_that_turns_shrinks_and_bends_is_one_group() -> None:
     points = grid()
     x, y = ((points - [200, 150]) / 200).T

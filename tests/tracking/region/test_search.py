@@ -65,6 +65,18 @@ def test_where_nothing_moves_no_place_is_told() -> None:
         looked.region_now()
 
 
+def test_what_is_fainter_than_the_wall_is_found_too() -> None:
+    """A face before bookshelves."""
+    frames = []
+    for frame in scene((90, 60, 130, 110, 25.0)):
+        still = (frame.image == texture(1)).all(axis=2)
+        faint = (120 + (frame.image.astype(int) - 128) // 5).astype(np.uint8)
+        frames.append(replace(frame, image=np.where(still[:, :, None], frame.image, faint)))
+    found = search(frames, WHOLE)
+    assert found.narrowed
+    assert overlap(found, 90, 60, 130, 110) > 0.4
+
+
 def test_within_a_loose_region_too() -> None:
     region = np.zeros_like(WHOLE)
     region[30:210, 40:280] = 255
