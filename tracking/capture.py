@@ -2,9 +2,9 @@
 
 import os
 import re
-import shlex
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
 from typing import Protocol, cast
@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from tracking import Image, TrackingError
+from tracking.decoder import Decoder
 from tracking.images import ImageFiles
 
 Log = Callable[[str], None]
@@ -145,8 +146,8 @@ def squared(capture: Capture, source: str, log: Log) -> Capture:
     return SquarePixels(capture, aspect)
 
 
-def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
-    """Open a source; `closing` and `log` as for `Reconnecting`.
+def open_capture(source: str, closing: threading.Event, log: Log, *, decodes: bool) -> Capture:
+    """Open a source; `closing` and `log` as for `Reconnecting`, `decodes`, of a file, whether OpenCV does.
 
     Raises:
         TrackingError: it is missing or cannot be decoded.
@@ -172,20 +173,28 @@ def open_capture(source: str, closing: threading.Event, log: Log) -> Capture:
         raise TrackingError(f"no video file {source}; check the path")
     if not os.access(path, os.R_OK):
         raise TrackingError(f"{source} cannot be read: permission denied")
-    file = cv2.VideoCapture(source)
-    if not file.isOpened():
-        raise TrackingError(f"{source} cannot be decoded; it is not a video, or it is damaged or cut off")
-    if (bits := few_bits_of(cast(Capture, file))) is not None:
+    file = cast(Capture, cv2.VideoCapture(source)) if decodes else Decoder(source)
+    if (bits := few_bits_of(file)) is not None:
         log(f"{source} is compressed to {bits:.2g} bits a pixel: little texture is left to follow; export it with more")
-    return squared(cast(Capture, file), source, log)
+    return squared(file, source, log)
 
 
-def times_rise(source: str) -> bool:
-    """Whether the first frames of a file have times that rise: of some OpenCV tells them in the decoder's order.
+@dataclass(frozen=True)
+class Probe:
+    """What the first frames of a file show.
 
-    Raises:
-        TrackingError: OpenCV makes no pictures of its interlaced frames: of some the same memory again and again.
+    Attributes:
+        decodes: whether OpenCV makes pictures of them: it may lack the decoder, and of some interlaced video it gives the
+            same memory again and again.
+        times_rise: of some it tells them in the decoder's order.
     """
+
+    decodes: bool
+    times_rise: bool
+
+
+def probe(source: str) -> Probe:
+    """Look at the first frames of a file."""
     capture = cv2.VideoCapture(source)
     times: list[float] = []
     pictures: list[Image] = []
@@ -194,12 +203,8 @@ def times_rise(source: str) -> bool:
         if len(pictures) < 2:
             pictures.append(cast(Image, capture.retrieve()[1]))
     capture.release()
-    if len(pictures) == 2 and np.array_equal(pictures[0], pictures[1]) and interlaced(source):
-        raise TrackingError(
-            f"{source} is interlaced video, which OpenCV {cv2.__version__} does not decode; convert it: "
-            f"ffmpeg -i {shlex.quote(source)} -vf bwdif -c:v libx264 -crf 18 converted.mp4"
-        )
-    return bool((np.diff(times) > 0).all())
+    alike = len(pictures) == 2 and np.array_equal(pictures[0], pictures[1])
+    return Probe(bool(pictures) and not (alike and interlaced(source)), bool((np.diff(times) > 0).all()))
 
 
 def interlaced(source: str) -> bool:

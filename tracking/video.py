@@ -1,6 +1,5 @@
 """Frames with true time stamps from a file, an image pattern, a camera or a URL."""
 
-import shlex
 import threading
 from collections.abc import Iterator
 from contextlib import suppress
@@ -22,13 +21,12 @@ from tracking.capture import (
     as_bgr,
     is_camera,
     open_capture,
-    times_rise,
+    probe,
 )
 
 DEFAULT_FPS = 30.0  # of sources that do not tell
 DECODE_AHEAD = 4  # frames waiting in the queue: enough to hide decoding, little memory
 BROKEN_FRAMES = 30  # so many unreadable frames in a row end the source
-AV1_FOURCC = "AV01"
 
 
 @dataclass(frozen=True)
@@ -89,7 +87,8 @@ class Video:
         self.source = source
         self._stop, self._duration_s = stop, duration_s
         self._closing = threading.Event()
-        self._capture = open_capture(source, self._closing, log)
+        probed = probe(source) if Path(source).is_file() else None
+        self._capture = open_capture(source, self._closing, log, decodes=probed is None or probed.decodes)
         self.live = is_camera(source) or isinstance(self._capture, Reconnecting)
         if drop_late and not self.live:
             self._capture.release()
@@ -98,7 +97,7 @@ class Video:
         self._began = monotonic()
         self._index = 0  # of the next frame grabbed
         self._time_s = -np.inf
-        self._timed = Path(source).is_file() and times_rise(source)
+        self._timed = probed is not None and probed.times_rise
         fps = self._capture.get(cv2.CAP_PROP_FPS)
         self.fps = fps if 0.5 < fps < 1000.0 else DEFAULT_FPS
         self._announced = announced_frames(self._capture)
@@ -235,11 +234,6 @@ class Video:
             return TrackingError(f"{self.source} ends at frame {self._index}; ask for frames before it")
         code = int(self._capture.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little", signed=True)
         codec = code.decode("ascii", "replace").strip("\0 ")
-        if codec.upper() == AV1_FOURCC:
-            return TrackingError(
-                f"{self.source} is AV1 video, which OpenCV {cv2.__version__} does not decode; convert it: "
-                f"ffmpeg -i {shlex.quote(self.source)} -c:v libx264 -crf 18 converted.mp4"
-            )
         if "://" in self.source:
             return TrackingError(
                 f"{self.source} gives no frame: it is no video, or its server does not serve parts of files; download it"

@@ -11,9 +11,9 @@ from tracking.region.surface import distance_to, holding
 
 SIDE_PX = 240  # the larger side of the picture that is cut: time grows with its area
 COLOURS = 5  # that GrabCut tells on each side: so many pixels at least must be known to be there
-DENSE = 1.0  # the same: points no farther apart than twice that are one; what lies apart from most is theirs if its colours are
 STEPS = 2  # of colours learned and the picture cut
-OUTSIDE, INSIDE = 1.0, 1.3  # times the usual distance between points on it, that the border may be from the rough one
+DENSE = 1.0  # times the usual distance between points on it, around each: what is then apart from most of it is doubtful
+OUTSIDE, INSIDE = 1.0, 1.3  # the same, that the border may be from the rough one
 KEPT = 0.87  # of the surface's points: if fewer are left, its colours are those of what is around it
 
 

@@ -67,7 +67,7 @@ def groups_of(W: Array, extent_px: float) -> Groups:
     torn = max(TORN_PX, float(np.median(tear)))  # in blurred pictures points go this way and that
     whole = by_end < TORN_OF * (apart + NOISE_SHARE * torn)
     parts = firm_parts(edges, tear < torn + TORN_SHARE * way[edges].min(axis=1), len(way))
-    whole_parts = joined(absorbed(parts, edges, whole), edges, whole.any(axis=0))
+    whole_parts = joined(absorbed(parts, edges, whole), edges, np.asarray(whole.any(axis=0)))
     label[often], motion = numbered(whole_parts, way)
     return Groups(label, motion)
 
@@ -85,7 +85,8 @@ def farthest(moved: Array) -> Array:
 def tear_px(place: Array, moved: Array, edges: Indices) -> tuple[Array, Array]:
     """How far ends of edges are from where the surroundings of the other ends carry them, and how far both move apart.
 
-    The former (2, n) px by the surroundings of the first ends and of the second, the latter (n,) px; of all frames the most.
+    The former (2, n) px by the surroundings of the first ends and of the second, the latter (n,) px; the most
+    of all frames.
 
     Args:
         place: (P, 2) px.

@@ -11,7 +11,6 @@ import pytest
 from tests.app.command_line import Command, Outcome, in_own_process
 from tests.synthetic_run import verify
 
-AV1 = Path(__file__).parents[3] / "tracking" / "sources" / "data" / "av1.mp4"
 POINTS = 40
 
 
@@ -203,24 +202,14 @@ def test_no_such_command(modeshape: Command, arguments: list[str]) -> None:
     check(modeshape(*arguments), "modeshape")
 
 
-def test_av1_says_how_to_convert(modeshape: Command, here: Path) -> None:
-    if cv2.VideoCapture(str(AV1)).read()[0]:
-        pytest.skip("this OpenCV decodes AV1")
-    check(modeshape("run", AV1), "av1.mp4 is AV1 video", "ffmpeg -i", "libx264")
-    assert tree(here) == {}
-
-
 OWN_PROCESS: list[tuple[str, Callable[[Path], Path]]] = [
     ("cannot be decoded", lambda videos: videos / "text.mp4"),
     ("corners found", lambda videos: videos / "black.mp4"),
-    ("AV1", lambda _: AV1),
 ]
 
 
-@pytest.mark.parametrize(("words", "source"), OWN_PROCESS, ids=["text", "black", "av1"])
+@pytest.mark.parametrize(("words", "source"), OWN_PROCESS, ids=["text", "black"])
 def test_no_library_talks_into_it(videos: Path, tmp_path: Path, words: str, source: Callable[[Path], Path]) -> None:
-    if words == "AV1" and cv2.VideoCapture(str(AV1)).read()[0]:
-        pytest.skip("this OpenCV decodes AV1")
     check(in_own_process(tmp_path, "run", source(videos)), words)
     assert list(tmp_path.iterdir()) == []
 
