@@ -7,7 +7,7 @@ import numpy as np
 
 from tracking import Array, Flags, Image
 from tracking.consistency import spacing_px
-from tracking.region.surface import distance_to, holding
+from tracking.region.surface import distance_to
 
 SIDE_PX = 240  # the larger side of the picture that is cut: time grows with its area
 COLOURS = 5  # that GrabCut tells on each side: so many pixels at least must be known to be there
@@ -33,9 +33,9 @@ def at_colours(mask: Image, image_bgr: Image, points_px: Array) -> Image:
     rough = cv2.resize(mask, small.shape[1::-1], interpolation=cv2.INTER_AREA) > 127
     spacing, places = spacing_px(points_px) * scale, scale * (points_px + 0.5)
     inside, outside = (within(part) / spacing for part in (rough, ~rough))
-    dense = (distance_to(places - 0.5, rough.shape) < DENSE * spacing).astype(np.uint8)
+    main = fullest((distance_to(places - 0.5, rough.shape) < DENSE * spacing).astype(np.uint8), places - 0.5)
     labels = np.where(rough, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
-    labels[(inside > INSIDE) & (holding(dense, places - 0.5, 1.0) > 0)] = cv2.GC_FGD
+    labels[main & (inside > INSIDE)] = cv2.GC_FGD
     labels[outside > OUTSIDE] = cv2.GC_BGD
     if min(np.count_nonzero(labels == sure) for sure in (cv2.GC_FGD, cv2.GC_BGD)) < COLOURS:
         return mask
@@ -48,6 +48,13 @@ def at_colours(mask: Image, image_bgr: Image, points_px: Array) -> Image:
     if np.mean(cut[y.clip(0, len(cut) - 1), x.clip(0, cut.shape[1] - 1)] > 0) < KEPT or not sure.any():
         return mask
     return np.where(cv2.resize(sure, mask.shape[::-1], interpolation=cv2.INTER_LINEAR) > 127, 255, 0).astype(np.uint8)
+
+
+def fullest(mask: Image, points: Array) -> Flags:
+    """The part (H, W) of a mask (H, W) of 0 and 1 that holds most of some points (n, 2) px in it."""
+    part = cv2.connectedComponents(mask)[1]
+    x, y = np.rint(points).astype(int).T
+    return np.asarray(part == np.bincount(part[y.clip(0, len(part) - 1), x.clip(0, part.shape[1] - 1)]).argmax())
 
 
 def within(part: Flags) -> Array:

@@ -17,6 +17,8 @@ NOISE_SHARE = 1 / 3  # of that
 TORN_OF = 0.75  # of how far its ends moved apart: what bends or stretches carries on, what tears jumps
 FAR = 0.12  # of the picture's larger side: longer edges join nothing
 CORE = 0.7  # of its edges that hold, or a point joins nothing: it may slide along a border
+STAYS_PX, STAYS = 2.0, 0.25  # a point that goes no farther, nor so much of the way that the farthest tenth goes, stays
+TENTH = 0.9
 SEED = 5  # points of a part that may be joined to another ...
 SEAM, SEAM_HOLDS = 5, 0.5  # ... by so many edges, of which so many are not torn
 FEWEST = 15  # points of a group
@@ -46,7 +48,7 @@ def groups_of(W: Array, extent_px: float) -> Groups:
 
     Edges of the Delaunay mesh hold where one end goes where the other's surroundings carry it. Parts that hang together by
     them are joined where most of the seam between them is not torn: a sheet that waves moves otherwise here than there, but
-    nowhere by jumps.
+    nowhere by jumps. Nor is there a jump where it is held, by something that stays: that is parted from it.
 
     Args:
         W: (F, P, 2) px, NaN where not seen; all are seen in the first frame.
@@ -67,8 +69,8 @@ def groups_of(W: Array, extent_px: float) -> Groups:
     torn = max(TORN_PX, float(np.median(tear)))  # in blurred pictures points go this way and that
     whole = by_end < TORN_OF * (apart + NOISE_SHARE * torn)
     parts = firm_parts(edges, tear < torn + TORN_SHARE * way[edges].min(axis=1), len(way))
-    whole_parts = joined(absorbed(parts, edges, whole), edges, np.asarray(whole.any(axis=0)))
-    label[often], motion = numbered(whole_parts, way)
+    parts = joined(absorbed(parts, edges, whole), edges, np.asarray(whole.any(axis=0)))
+    label[often], motion = numbered(parted(parts, way), way)
     return Groups(label, motion)
 
 
@@ -195,6 +197,17 @@ def joined(part: Indices, edges: Indices, whole: Flags) -> Indices:
             return part
         part[part == pairs[k, 1]] = pairs[k, 0]
         size = np.bincount(part[part >= 0], minlength=len(part))
+
+
+def parted(part: Indices, way: Array) -> Indices:
+    """Parts (P,), those in which many points stay and many move parted by that, by the way (P,) each point went."""
+    part = part.copy()
+    for one in np.unique(part[part >= 0]):
+        own = part == one
+        stays = own & (way < min(STAYS_PX, STAYS * np.quantile(way[own], TENTH)))
+        if min(stays.sum(), (own & ~stays).sum()) >= FEWEST:
+            part[stays] = part.max() + 1
+    return part
 
 
 def numbered(part: Indices, way: Array) -> tuple[Indices, Array]:

@@ -17,7 +17,6 @@ SHARED = 0.5  # ... one that goes so much of its way: a lip or a chin goes farth
 REACH = 1.0  # times the usual distance between points on it, that the surface goes on beyond them
 GAP = 2.0  # the same: narrower gaps between its parts are its own
 FAR_ENOUGH = 0.05  # of the picture's larger side: what has moved so far in a region that was drawn has moved
-PART = 0.25  # of the points in its largest part: other parts with fewer are something else that hardly moves against it
 HOLE = 15  # points of something else in a hole of the surface: with fewer, it is none
 OTHER_SHARE = 0.1  # of the best group's score: less, and a group is not worth a word
 
@@ -127,7 +126,6 @@ def surface_mask(place: Array, own: Flags, others: Flags, region: Image) -> Imag
     whole = (1 - grown(1 - grown(near, GAP * spacing), GAP * spacing)) * nearer
     smooth = grown(1 - grown(1 - whole, REACH * spacing), REACH * spacing)
     smooth = smooth if smooth.any() else near  # points too far apart for anything smooth
-    smooth = holding(smooth, place[own], PART)
     contours, levels = cv2.findContours(smooth, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     mask = np.zeros(region.shape[:2], np.uint8)
     cv2.drawContours(
@@ -143,15 +141,6 @@ def surface_mask(place: Array, own: Flags, others: Flags, region: Image) -> Imag
         ):
             mask[(hole > 0) & (smooth == 0)] = 0
     return cast(Image, mask & region)
-
-
-def holding(mask: Image, points: Array, share: float) -> Image:
-    """The parts of a mask (H, W) of 0 and 1 that hold as many of some points (n, 2) px as the fullest, or such a share."""
-    part = cv2.connectedComponents(mask)[1]
-    x, y = np.rint(points).astype(int).T
-    count = np.bincount(part[y.clip(0, len(part) - 1), x.clip(0, part.shape[1] - 1)], minlength=part.max() + 1)
-    count[0] = 0
-    return ((count >= share * count.max())[part] & (part > 0)).astype(np.uint8)
 
 
 def grown(mask: Image, radius_px: float) -> Image:

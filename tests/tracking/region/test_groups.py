@@ -91,3 +91,14 @@ def test_sheets_that_wave_are_not_torn(shared_data: Path, name: str) -> None:
     W = np.load(shared_data / f"{name}.npz")["W"].transpose(0, 2, 1)[::4]
     found = groups_of(W, float(np.ptp(W[0], axis=0).max()))
     assert found.sizes[0] > 0.8 * W.shape[1]
+
+
+def test_a_sheet_that_is_held_at_one_side_is_not_its_background() -> None:
+    """Where it is held both stay: no motion is torn there."""
+    points = grid(8.0, 1.5)
+    sheet = (np.abs(points - [200, 150]) < [120, 80]).all(axis=1)
+    swing = ((points[:, 0] - 80) / 240).clip(0) ** 2 * 30
+    found = groups_of(tracks(points, np.where(sheet, swing, 0.0)[:, None] * [0.0, 1.0]), EXTENT)
+    outer = sheet & (points[:, 0] > 200)
+    assert (found.label[~sheet] == 0).mean() > 0.9
+    assert (found.label[outer] == 1).mean() > 0.8
