@@ -201,7 +201,8 @@ def probe(source: str) -> Probe:
     while len(times) < PROBED and capture.grab():
         times.append(capture.get(cv2.CAP_PROP_POS_MSEC))
         if len(pictures) < 2:
-            pictures.append(cast(Image, capture.retrieve()[1]))
+            ok, picture = capture.retrieve()
+            pictures += [cast(Image, picture)] if ok else []
     capture.release()
     alike = len(pictures) == 2 and np.array_equal(pictures[0], pictures[1])
     return Probe(bool(pictures) and not (alike and interlaced(source)), bool((np.diff(times) > 0).all()))

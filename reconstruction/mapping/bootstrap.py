@@ -50,7 +50,7 @@ def bootstrap(W: Array, visible: Mask, camera: Camera, settings: Settings, last:
                 # Things that move by themselves pass for parallax until perspective is reckoned with.
                 doubt = f"the object turned {turn:.1f}° in {len(W)} frames, about {TURN_DEGREES:.0f}° are needed"
         except ReconstructionError as error:  # frames of too few points in common
-            doubt = str(error)
+            doubt = str(error).removeprefix("cannot recover a rest shape: ")
     if not last:
         return None
     if kind == "rigid":
