@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from tracking import Image, TrackingError
-from tracking.capture import (
+from tracking.sources.capture import (
     Log,
     Reconnecting,
     announced_frames,

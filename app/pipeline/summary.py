@@ -12,8 +12,8 @@ from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
 from app.terminal.exit_code import ExitCode
 from app.terminal.summary import Summary, print_lines
-from tracking.capture import few_bits
 from tracking.guarded import Change, Guarded
+from tracking.sources.capture import few_bits
 
 KINDS = BY_KEYFRAMES | {"plane": "flat sheet", "mesh": "mesh given", "truth": "shape given"}
 

@@ -12,7 +12,7 @@ import rerun as rr
 from app.arrays import Array, Image, Indices
 from app.recording.columns import Values
 from app.terminal.errors import UsageError
-from tracking.capture import Capture, pixel_aspect
+from tracking.sources.capture import Capture, pixel_aspect
 from tracking.video import Video
 
 JPEG_QUALITY = 75  # of a video that was compressed before; 85 looks the same and takes 1.4 times as much

@@ -14,8 +14,8 @@ import pytest
 
 from tests.tracking.scene import texture
 from tracking import TrackingError
-from tracking.capture import probe
-from tracking.decoder import Decoder
+from tracking.sources.capture import probe
+from tracking.sources.decoder import Decoder
 from tracking.video import Frame, Video
 
 AV1 = Path(__file__).with_name("data") / "av1.mp4"

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tracking.images import missing_numbers
+from tracking.sources.images import missing_numbers
 from tracking.video import Frame, Video
 
 AV1 = Path(__file__).with_name("data") / "av1.mp4"

@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 
 from tracking import Image, TrackingError
-from tracking.decoder import Decoder
-from tracking.images import ImageFiles
+from tracking.sources.decoder import Decoder
+from tracking.sources.images import ImageFiles
 
 Log = Callable[[str], None]
 

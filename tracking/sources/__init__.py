@@ -1,0 +1,1 @@
+"""What frames come from: files by two decoders, numbered images, cameras and streams."""
