@@ -19,6 +19,7 @@ FAR = 0.12  # of the picture's larger side: longer edges join nothing
 CORE = 0.7  # of its edges that hold, or a point joins nothing: it may slide along a border
 STAYS_PX, STAYS = 2.0, 0.25  # a point that goes no farther, nor so much of the way that the farthest tenth goes, stays
 TENTH = 0.9
+BETWEEN = 0.5  # times as many points as stay may go up to twice as far as those
 SEED = 5  # points of a part that may be joined to another ...
 SEAM, SEAM_HOLDS = 5, 0.5  # ... by so many edges, of which so many are not torn
 FEWEST = 15  # points of a group
@@ -200,12 +201,17 @@ def joined(part: Indices, edges: Indices, whole: Flags) -> Indices:
 
 
 def parted(part: Indices, way: Array) -> Indices:
-    """Parts (P,), those in which many points stay and many move parted by that, by the way (P,) each point went."""
+    """Parts (P,), those in which many points stay and many move parted by that, by the way (P,) each point went.
+
+    Few may go a little farther than what stays: on a sheet that turns as many do, beside its axis.
+    """
     part = part.copy()
     for one in np.unique(part[part >= 0]):
         own = part == one
-        stays = own & (way < min(STAYS_PX, STAYS * np.quantile(way[own], TENTH)))
-        if min(stays.sum(), (own & ~stays).sum()) >= FEWEST:
+        least = min(STAYS_PX, STAYS * float(np.quantile(way[own], TENTH)))
+        stays, moves = own & (way < least), own & (way >= least)
+        between = moves & (way < 2 * least)
+        if min(stays.sum(), moves.sum()) >= FEWEST and between.sum() < BETWEEN * stays.sum():
             part[stays] = part.max() + 1
     return part
 

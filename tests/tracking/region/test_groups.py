@@ -102,3 +102,10 @@ def test_a_sheet_that_is_held_at_one_side_is_not_its_background() -> None:
     outer = sheet & (points[:, 0] > 200)
     assert (found.label[~sheet] == 0).mean() > 0.9
     assert (found.label[outer] == 1).mean() > 0.8
+
+
+def test_the_axis_of_a_sheet_that_turns_is_a_part_of_it() -> None:
+    points = grid()
+    found = groups_of(tracks(points, (points - [200, 150]) * [-0.06, 0.0]), EXTENT)
+    assert len(found.sizes) == 1
+    assert found.sizes[0] > 0.9 * len(points)
