@@ -10,11 +10,11 @@ from tracking import Array, Flags, Image, TrackingError
 from tracking.features import detect_corners
 from tracking.flow import CONVERGED_PX, FEW_GUIDES, Grays, levels_of, lucas_kanade, returned
 from tracking.region.border import at_colours
+from tracking.region.groups import TENTH
 from tracking.region.surface import FAR_ENOUGH, Surface, middling, surfaces
 from tracking.video import Frame
 
 MOST_FRAMES = 90  # are looked at
-TENTH = 0.9  # when the farthest tenth of what is in the middle has moved `FAR_ENOUGH`, that is enough
 MIDDLE = 0.5  # of a region that was drawn: nearer to its middle than to its border
 SEEN = 0.5  # of the points: fewer left say nothing of the others, or it is another picture
 CLEARER = 2.0  # times the contrast of the first frame: it was still fading in

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from tracking import Image, TrackingError
-from tracking.sources.decoder import Decoder
+from tracking.sources.decoder import Decoder, interlaced
 from tracking.sources.images import ImageFiles
 
 Log = Callable[[str], None]
@@ -206,17 +206,6 @@ def probe(source: str) -> Probe:
     capture.release()
     alike = len(pictures) == 2 and np.array_equal(pictures[0], pictures[1])
     return Probe(bool(pictures) and not (alike and interlaced(source)), bool((np.diff(times) > 0).all()))
-
-
-def interlaced(source: str) -> bool:
-    """Whether the first frame of a file says so."""
-    import av  # few come here
-
-    try:
-        with av.open(source) as file:
-            return next(file.decode(video=0)).interlaced_frame
-    except (av.FFmpegError, StopIteration, IndexError):
-        return False
 
 
 def is_camera(source: str) -> bool:

@@ -87,3 +87,14 @@ class Decoder:
                     yield cast("VideoFrame", graph.pull())
                 except (BlockingIOError, EOFError):  # it wants another one; that was the last
                     break
+
+
+def interlaced(source: str) -> bool:
+    """Whether the first frame of a file says so."""
+    import av  # few come here
+
+    try:
+        with av.open(source) as file:
+            return next(file.decode(video=0)).interlaced_frame
+    except (av.FFmpegError, StopIteration, IndexError):
+        return False

@@ -5,8 +5,7 @@ from pathlib import Path
 import av
 import numpy as np
 
-from tracking.sources.capture import interlaced
-from tracking.sources.decoder import Decoder
+from tracking.sources.decoder import Decoder, interlaced
 from tracking.video import Video
 
 INTERLACED_DCT, INTERLACED_MOTION = 1 << 18, 1 << 29
