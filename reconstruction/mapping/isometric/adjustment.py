@@ -23,7 +23,7 @@ from reconstruction.mapping.isometric.lengths import (
     robust_lengths,
     usual,
 )
-from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_of, rays_of
+from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_of, on_edges, rays_of
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
 from reconstruction.mapping.isometric.warps import Warps, smooth_warps
@@ -83,7 +83,7 @@ def on_smooth_images(warps: Warps, camera: Camera) -> IsometricSheet:
     field = smooth_field(nodes.reference, FUNCTIONS)
     values = np.full((len(warps.placed), len(field.stiffness)), np.nan)
     values[warps.placed] = field.at(warps.reference[:, warps.placed])
-    seen = edges_between(nodes, values, camera)
+    seen = edges_between(nodes, on_edges(nodes, field), camera)
     c = first_depths(nodes, seen, values[nodes.points], field.stiffness, camera)
     factor, change = np.ones(len(nodes.ends)), np.inf
     for _ in range(ROUNDS):
@@ -100,7 +100,7 @@ def on_smooth_images(warps: Warps, camera: Camera) -> IsometricSheet:
 def by_part(found: IsometricSheet, part: Indices) -> IsometricSheet:
     """The sheet by some of its frames alone: depths and lengths adjusted anew from those there are."""
     nodes = found.nodes.in_frames(part)
-    edges = edges_between(nodes, found.values, found.camera).weighted(found.edge_weights)
+    edges = edges_between(nodes, on_edges(nodes, found.field), found.camera).weighted(found.edge_weights)
     c = adjust_depths(edges, found.coefficients[part], found.field.stiffness, SOLVER)
     return described(found.warps.in_frames(part), nodes, found.field, found.values, c, found.edge_weights, found.camera)
 
@@ -131,7 +131,7 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
         places[:, placed] += places_moved(C, rays, weights[:, placed], found.functions[placed], slopes)
         found = found.moved(places)
         way = GOING_ON * way if k >= ROUGH_ROUNDS else 0 * way
-        way = way + np.median(found.lengths.now(C)[1], axis=0) - found.log_lengths
+        way = way + np.median(found.lengths.now(C)[0], axis=0) - found.log_lengths
         found = replace(found, log_lengths=found.log_lengths + way)
         before, shapes = shapes, C @ found.functions.T
         if np.sqrt(np.nanmean((shapes - before) ** 2)) < SETTLED * np.nanstd(before):
@@ -143,7 +143,7 @@ def described(
     warps: Warps, nodes: Nodes, field: SmoothField, values: Array, c: Array, factor: Array, camera: Camera
 ) -> IsometricSheet:
     """The sheet of coefficients (F, r), with its lengths and how well they are kept."""
-    edges = edges_between(nodes, values, camera).weighted(factor)
+    edges = edges_between(nodes, on_edges(nodes, field), camera).weighted(factor)
     g = edges.log_lengths(c)
     logs = mean_log_lengths(edges, g)
     off = g - logs

@@ -11,7 +11,7 @@ import numpy as np
 from reconstruction.arrays import Array
 
 FUNCTIONS = 60
-GIVE = 0.0025  # of lengths: what they change by, noise apart
+GIVE = 0.002  # of lengths: what they change by, noise apart
 BEND = 1e3  # against the squared misfits: decides only where nothing is seen
 
 
@@ -19,22 +19,29 @@ BEND = 1e3  # against the squared misfits: decides only where nothing is seen
 class Lengths:
     """Edges of a sheet made of smooth functions.
 
+    An edge is a line on the surface, not a chord, which gets shorter as the surface bends: its length is that of the two
+    chords over its halves, and by a third of what these are longer than the one chord (Richardson).
+
     Attributes:
-        slopes: (n, R) the functions at one end less those at the other.
+        halves: (2, n, R) the functions at the middle less those at one end, and at the other end less those at the middle.
         logs: (n,) logarithms of the lengths.
         weights: (n,) 1 for edges that keep their length, near 0 for those that do not.
         stiffness: (R,) bending energy of the functions.
     """
 
-    slopes: Array
+    halves: Array
     logs: Array
     weights: Array
     stiffness: Array
 
     def now(self, C: Array) -> tuple[Array, Array]:
-        """Edges (F, 3, n) of shapes C (F, 3, R), and the logarithms (F, n) of their lengths."""
-        d = C @ self.slopes.T
-        return d, 0.5 * np.log(np.maximum((d**2).sum(axis=1), 1e-300))
+        """Logarithms (F, n) of the lengths in shapes C (F, 3, R), and their slopes (2, F, 3, n) by the two half edges."""
+        d = np.stack([C @ half.T for half in self.halves])
+        chord = d.sum(axis=0)
+        longer = [np.sqrt(np.maximum((e**2).sum(axis=-2, keepdims=True), 1e-300)) for e in (d, chord)]
+        length = (4 * longer[0].sum(axis=0) - longer[1]) / 3
+        slopes = (4 * d / longer[0] - chord / longer[1]) / (3 * length)
+        return np.log(length[:, 0]), slopes
 
 
 def data_normal(rays: Array, weights: Array, C: Array, B: Array) -> Array:
@@ -60,8 +67,8 @@ def data_normal(rays: Array, weights: Array, C: Array, B: Array) -> Array:
 def stepped(C: Array, data: Array, lengths: Lengths) -> Array:
     """Shapes C (F, 3, R) after a Gauss-Newton step towards their lengths, by the normal matrix of their data."""
     F, _, R = C.shape
-    d, logs = lengths.now(C)
-    J = (d * np.exp(-2 * logs)[:, None])[:, :, None] * lengths.slopes.T  # (F, 3, R, n)
+    logs, (first, second) = lengths.now(C)
+    J = first[:, :, None] * lengths.halves[0].T + second[:, :, None] * lengths.halves[1].T  # (F, 3, R, n)
     J = J.reshape(F, 3 * R, -1)
     weighted = J * (lengths.weights / GIVE**2)
     held = np.tile(BEND * lengths.stiffness + 1e-6, 3)

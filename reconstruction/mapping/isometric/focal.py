@@ -8,7 +8,6 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.mapping.isometric.adjustment import by_part, on_smooth_images, with_focal
 from reconstruction.mapping.isometric.lengths import robust_lengths
-from reconstruction.mapping.isometric.nodes import edges_between
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 
 FACTORS = (0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8, 2.3, 3.0, 4.0)  # of the focal length that are tried first
@@ -38,8 +37,7 @@ class FocalSearch:
 
 def typical_strain(sheet: IsometricSheet) -> float:
     """Change of length of the typical edge: the geometric mean, so that the few that are on no sheet do not decide."""
-    edges = edges_between(sheet.nodes, sheet.values, sheet.camera).weighted(sheet.edge_weights)
-    change = robust_lengths(edges, edges.log_lengths(sheet.coefficients))[2]
+    change = robust_lengths(sheet.edges, sheet.edges.log_lengths(sheet.coefficients))[2]
     return float(np.exp(np.log(np.maximum(change, EXACT)).mean()))
 
 

@@ -18,11 +18,14 @@ FIRST_STEPS, LEFT = 2, 2  # after so many steps only so many starts go on
 class Edges:
     """n edges between m points seen along rays q in F frames; depths are exp(B c_f), B smooth functions, c_f (r,).
 
+    An edge is a line on the surface, not a chord, which gets shorter as the surface bends: its length is that of the two
+    chords over its halves, and by a third of what these are longer than the one chord (Richardson's extrapolation).
+
     Attributes:
         ends: (n, 2) point indices.
-        squares: (F, 2, n) |q_i|², |q_j|².
-        products: (F, n) q_i · q_j.
-        B: (2, n, r) the functions at both ends.
+        squares: (F, 3, n) |q|² at its first end, its middle and its second end.
+        products: (F, 3, n) q · q of first end and middle, middle and second end, first and second end.
+        B: (3, n, r) the functions at first end, middle and second end.
         weights: (F, n) how well each length is seen, 0 to 1.
     """
 
@@ -33,23 +36,30 @@ class Edges:
     weights: Array
 
     def log_lengths(self, c: Array) -> Array:
-        """The logs g = ½ log L (F, n) at c (F, r)."""
-        return np.asarray(0.5 * np.log(self.squared(c)[0]))
+        """The logs g (F, n) of the lengths with coefficients c (F, r)."""
+        return self.logs_and_shares(c)[0]
 
     def derivatives(self, c: Array) -> Array:
-        """Their derivatives (F, n, r) by c: share_i b_i + (1 − share_i) b_j."""
-        return np.asarray(self.squared(c)[1][:, :, None] * (self.B[0] - self.B[1]) + self.B[1])
+        """Their derivatives (F, n, r) by c."""
+        return self.by_shares(self.logs_and_shares(c)[1])
 
-    def squared(self, c: Array) -> tuple[Array, Array]:
-        """Squared lengths L = μ_i²|q_i|² − 2 μ_i μ_j q_i·q_j + μ_j²|q_j|² and the shares (μ_i²|q_i|² − μ_iμ_j q_i·q_j)/L.
+    def by_shares(self, shares: Array) -> Array:
+        """Derivatives (F, n, r) by c from those (2, F, n) by the log depths of both ends; the middle's is the rest."""
+        first, middle, second = self.B
+        return np.asarray(shares[0][:, :, None] * (first - middle) + (shares[1][:, :, None] * (second - middle) + middle))
 
-        Both are (F, n).
-        """
-        mi, mj = (np.exp(np.clip(c @ B.T, -FARTHEST, FARTHEST)) for B in self.B)
-        cross = mi * mj * self.products
-        ii = mi**2 * self.squares[:, 0] - cross
-        L = np.maximum(ii + mj**2 * self.squares[:, 1] - cross, 1e-300)
-        return L, ii / L
+    def logs_and_shares(self, c: Array) -> tuple[Array, Array]:
+        """The logs g (F, n), and their derivatives (2, F, n) by the log depths of both ends."""
+        i, m, j = (np.exp(np.clip(c @ B.T, -FARTHEST, FARTHEST)) for B in self.B)
+        ii, mm, jj = (depth**2 * self.squares[:, k] for k, depth in enumerate((i, m, j)))
+        im, mj, ij = (depths * self.products[:, k] for k, depths in enumerate((i * m, m * j, i * j)))
+        first, second, chord = (
+            np.sqrt(np.maximum(one + other - 2 * cross, 1e-300))
+            for one, other, cross in ((ii, mm, im), (mm, jj, mj), (ii, jj, ij))
+        )
+        length = (4 * (first + second) - chord) / 3
+        shares = (4 * (ii - im) / first - (ii - ij) / chord, 4 * (jj - mj) / second - (jj - ij) / chord)
+        return np.log(length), np.stack(shares) / (3 * length)
 
     def rms(self, values: Array) -> Array:
         """Weighted rms (F,) over the edges of values (F, n)."""
@@ -65,12 +75,15 @@ class Edges:
         return replace(self, weights=self.weights * factor)
 
 
-def edges_of(rays: Array, ends: Indices, B: Array, weights: Array) -> Edges:
-    """Edges (n, 2) between points with rays (F, 3, m) and functions B (m, r), weights (F, n)."""
-    i, j = ends.T
-    squares = (rays**2).sum(axis=1)
-    products = (rays[:, :, i] * rays[:, :, j]).sum(axis=1)
-    return Edges(ends, np.stack([squares[:, i], squares[:, j]], axis=1), products, np.stack([B[i], B[j]]), weights)
+def edges_of(rays: Array, middles: Array, ends: Indices, B: Array, weights: Array) -> Edges:
+    """Edges (n, 2) between points along rays (F, 3, m), their middles along others (F, 3, n).
+
+    Functions B (3, n, r) and weights (F, n) as in `Edges`.
+    """
+    i, j = (rays[:, :, end] for end in ends.T)
+    squares = np.stack([(q**2).sum(axis=1) for q in (i, middles, j)], axis=1)
+    products = np.stack([(p * q).sum(axis=1) for p, q in ((i, middles), (middles, j), (i, j))], axis=1)
+    return Edges(ends, squares, products, B, weights)
 
 
 @dataclass(frozen=True)
@@ -163,11 +176,11 @@ def finish_depths(edges: Edges, logs: Array, c: Array, stiffness: Array, bend: f
     before = frame_costs(edges, logs, c, stiffness, bend)
     damping = np.full(len(c), 1e-3)
     for _ in range(steps):
-        L, share = edges.squared(c)
-        J = share[:, :, None] * (edges.B[0] - edges.B[1]) + edges.B[1]
+        g, shares = edges.logs_and_shares(c)
+        J = edges.by_shares(shares)
         wJ = w[:, :, None] * J
         H = J.transpose(0, 2, 1) @ wJ
-        right = ((0.5 * np.log(L) - logs)[:, None] @ wJ)[:, 0] + held * c
+        right = ((g - logs)[:, None] @ wJ)[:, 0] + held * c
         diagonal = np.einsum("frr->fr", H)
         diagonal += held
         diagonal += diagonal * damping[:, None] + 1e-9

@@ -7,6 +7,7 @@ import numpy as np
 from reconstruction.arrays import Array, Indices
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.lengths import Edges, edges_of
+from reconstruction.mapping.isometric.smooth_field import SmoothField
 from reconstruction.mapping.isometric.warps import Warps
 
 NODES = 80
@@ -24,6 +25,7 @@ class Nodes:
         images: (F, 2, m) px, smoothed.
         variance: (F, m) of a coordinate there, px².
         ends: (n, 2) edges between neighbours.
+        middles: (F, 2, n) px, where the middles of the edges are seen; `halfway` is where they are in the reference image.
     """
 
     points: Indices
@@ -31,6 +33,12 @@ class Nodes:
     images: Array
     variance: Array
     ends: Indices
+    middles: Array
+
+    @property
+    def halfway(self) -> Array:
+        """(2, n) middles of the edges in the reference image, px."""
+        return np.asarray(self.reference[:, self.ends].mean(axis=2))
 
     def nearest(self, reference: Array) -> Indices:
         """Which node (p,) is nearest to each of the points (2, p) in the reference image; any for those without a place."""
@@ -45,14 +53,16 @@ class Nodes:
 
     def in_frames(self, chosen: Indices) -> "Nodes":
         """The same in some of the keyframes."""
-        return replace(self, images=self.images[chosen], variance=self.variance[chosen])
+        return replace(self, images=self.images[chosen], variance=self.variance[chosen], middles=self.middles[chosen])
 
 
 def nodes_of(warps: Warps) -> Nodes:
     """Nodes of a sheet from its smooth images."""
     points = warps.few[:NODES]
     images = warps.images(points)
-    return Nodes(points, warps.reference[:, points], images, warps.variance(points), neighbours(images, NEIGHBOURS))
+    ends = neighbours(images, NEIGHBOURS)
+    middles = warps.images_at(warps.reference[:, points[ends]].mean(axis=2))
+    return Nodes(points, warps.reference[:, points], images, warps.variance(points), ends, middles)
 
 
 def rays_of(images: Array, camera: Camera) -> Array:
@@ -75,13 +85,19 @@ def neighbours(images: Array, count: int) -> Indices:
     return found
 
 
-def edges_between(nodes: Nodes, values: Array, camera: Camera) -> Edges:
+def on_edges(nodes: Nodes, field: SmoothField) -> Array:
+    """The functions of a field (3, n, r) at first end, middle and second end of each edge."""
+    first, second = field.at(nodes.reference)[nodes.ends].swapaxes(0, 1)
+    return np.stack([first, field.at(nodes.halfway), second])
+
+
+def edges_between(nodes: Nodes, B: Array, camera: Camera) -> Edges:
     """Edges weighted by how well each length is seen: its variance by noise against the usual strain.
 
-    `values` (p, r) are those of the functions that log depths are made of, at all points.
+    `B` (3, n, r) are the functions that log depths are made of, as `on_edges` gives them.
     """
-    rays = rays_of(nodes.images, camera)
-    return edges_of(rays, nodes.ends, values[nodes.points], 1 / (1 + nodes.noise_squared() / USUAL_STRAIN**2))
+    rays, middles = (rays_of(images, camera) for images in (nodes.images, nodes.middles))
+    return edges_of(rays, middles, nodes.ends, B, 1 / (1 + nodes.noise_squared() / USUAL_STRAIN**2))
 
 
 def nearest(images: Array, others: Array) -> Indices:

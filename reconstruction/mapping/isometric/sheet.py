@@ -10,8 +10,8 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FUNCTIONS, Lengths, data_normal, stepped
 from reconstruction.mapping.isometric.convex import convex_finish
-from reconstruction.mapping.isometric.lengths import best_start
-from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, nearest, rays_of
+from reconstruction.mapping.isometric.lengths import Edges, best_start
+from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, nearest, on_edges, rays_of
 from reconstruction.mapping.isometric.robust_fit import ENOUGH
 from reconstruction.mapping.isometric.smooth_field import SmoothField
 from reconstruction.mapping.isometric.warps import Warps, quick_fit
@@ -87,9 +87,7 @@ class IsometricSheet:
 
         Once it is bundled, shapes hold hardly any noise: 0.002 to 0.005 where all is well, whatever the noise.
         """
-        i, j = self.nodes.points[self.nodes.ends].T
-        shapes = self.shapes()
-        logs = np.log(np.linalg.norm(shapes[:, :, i] - shapes[:, :, j], axis=1))
+        logs = self.lengths.now(self.shapes()[:, :, self.warps.few] @ self.projector)[0]
         return float(np.sqrt(((logs - np.median(logs, axis=0)) ** 2).mean()))
 
     @property
@@ -116,8 +114,11 @@ class IsometricSheet:
             usual: change of lengths in the frames before, which is not bad, if that in keyframes is less.
         """
         points = self.nodes.points
-        image, variance, weights = quick_fit(self.warps, W, visible, points)
-        c, strain = self._depths(replace(self.nodes, images=image[None, :, points], variance=variance[None]), usual)
+        coefficients, variance, weights = quick_fit(self.warps, W, visible, points)
+        image, middles = ((B @ coefficients).T for B in (self.warps.values, self.halfway))
+        c, strain = self._depths(
+            replace(self.nodes, images=image[None, :, points], variance=variance[None], middles=middles[None]), usual
+        )
         held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
         known = visible | held[self.nodes.nearest(self.warps.reference)]
         start = np.exp(c @ self.values.T) * rays_of(image[None], self.camera)[0]
@@ -128,6 +129,16 @@ class IsometricSheet:
             (1 - RENEWED) * usual + RENEWED * float(strain[0]),
         )
 
+    @cached_property
+    def halfway(self) -> Array:
+        """(n, R) the functions that images are made of at the middles of the edges."""
+        return self.warps.field.at(self.nodes.halfway)
+
+    @cached_property
+    def edges(self) -> Edges:
+        """Its edges in its keyframes, weighted by whether they keep their length, too."""
+        return edges_between(self.nodes, on_edges(self.nodes, self.field), self.camera).weighted(self.edge_weights)
+
     @property
     def functions(self) -> Array:
         """(p, R) those that shapes are made of."""
@@ -136,9 +147,14 @@ class IsometricSheet:
     @cached_property
     def lengths(self) -> Lengths:
         """Its edges."""
-        i, j = self.nodes.points[self.nodes.ends].T
-        slopes = self.functions[i] - self.functions[j]
-        return Lengths(slopes, self.log_lengths, self.edge_weights, self.warps.field.stiffness[:FUNCTIONS])
+        first, second = self.functions[self.nodes.points[self.nodes.ends]].swapaxes(0, 1)
+        middle = self.halfway[:, :FUNCTIONS]
+        return Lengths(
+            np.stack([middle - first, second - middle]),
+            self.log_lengths,
+            self.edge_weights,
+            self.warps.field.stiffness[:FUNCTIONS],
+        )
 
     @cached_property
     def projector(self) -> Array:
@@ -161,7 +177,9 @@ class IsometricSheet:
         """The same with points at other places (2, p) of the reference image."""
         warps, values = self.warps.moved(places), np.full_like(self.values, np.nan)
         values[warps.placed] = self.field.at(places[:, warps.placed])
-        return replace(self, warps=warps, values=values, nodes=replace(self.nodes, reference=places[:, self.nodes.points]))
+        nodes = replace(self.nodes, reference=places[:, self.nodes.points])
+        nodes = replace(nodes, middles=warps.images_at(nodes.halfway))
+        return replace(self, warps=warps, values=values, nodes=nodes)
 
     def with_shapes(self, shapes: Array) -> "IsometricSheet":
         """The same with other shapes (F, 3, p) in its keyframes.
@@ -175,12 +193,12 @@ class IsometricSheet:
         image = shapes[:, :2, few] / shapes[:, 2:, few] * self.camera.focal_px + self.camera.center_px[:, None]
         to_images, to_depths = (np.linalg.pinv(B[few]) for B in (self.warps.values, self.values))
         warps = replace(self.warps, coefficients=to_images @ image.transpose(0, 2, 1))
-        nodes = replace(self.nodes, images=warps.images(self.nodes.points))
+        nodes = replace(self.nodes, images=warps.images(self.nodes.points), middles=warps.images_at(self.nodes.halfway))
         return replace(self, warps=warps, nodes=nodes, coefficients=np.log(shapes[:, 2, few]) @ to_depths.T)
 
     def _depths(self, nodes: Nodes, usual: float) -> tuple[Array, Array]:
         """Coefficients (F, r) of log depths with which nodes keep their lengths in their images, and how well (F,)."""
-        edges = edges_between(nodes, self.values, self.camera).weighted(self.edge_weights)
+        edges = edges_between(nodes, self.edges.B, self.camera).weighted(self.edge_weights)
         alike = nearest(nodes.images, self.nodes.images)[:, :2]
         starts = list(self.coefficients[alike].swapaxes(0, 1))
         c = best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, STEPS)

@@ -61,6 +61,10 @@ class Warps:
         """Where points are in all images, (F, 2, n) px."""
         return np.asarray((self.values[points] @ self.coefficients).transpose(0, 2, 1))
 
+    def images_at(self, places: Array) -> Array:
+        """The same (F, 2, n) px of any places (2, n) of the reference image."""
+        return np.asarray((self.field.at(places) @ self.coefficients).transpose(0, 2, 1))
+
     @property
     def noise_over_size(self) -> float:
         """Usual noise over the images' RMS radius."""
@@ -140,7 +144,7 @@ def quick_fit(warps: Warps, w: Array, visible: Mask, points: Indices) -> tuple[A
     """One more image w (2, p) px made smooth: as `robust_fit` does, but by the few points only.
 
     Returns:
-        (2, p) px of all points, variance (n,) px² of a coordinate of some of them, weights (p,) px⁻² of the observations.
+        coefficients (r, 2), variance (n,) px² of a coordinate of some points, weights (p,) px⁻² of the observations.
     """
     B, stiffness, every = warps.values, warps.field.stiffness, np.flatnonzero(visible & warps.placed)
     some = spread_rows(visible & warps.placed, warps.few)
@@ -155,7 +159,7 @@ def quick_fit(warps: Warps, w: Array, visible: Mask, points: Indices) -> tuple[A
     h, _, usual = weights_of(w[:, every].T - image[every], finest)
     weights[every] = h / usual**2
     at = B[points]
-    return image.T, usual**2 / h.sum() * ((at @ np.linalg.inv(gram)) * at).sum(axis=1), weights
+    return c, usual**2 / h.sum() * ((at @ np.linalg.inv(gram)) * at).sum(axis=1), weights
 
 
 def cross_validated(B: Array, W: Array, weights: Array, stiffness: Array) -> float:

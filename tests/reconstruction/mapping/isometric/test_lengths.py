@@ -1,6 +1,7 @@
 """Log lengths along rays: derivatives, scale, and that the adjustment goes down to a minimum."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,7 +18,10 @@ def some_edges(rng: np.random.Generator) -> tuple[Edges, np.ndarray, np.ndarray]
     field = smooth_field(xy, R)
     rays = np.concatenate([xy + 0.05 * rng.standard_normal((F, 2, M)), np.ones((F, 1, M))], axis=1)
     ends = np.unique(np.sort([rng.choice(M, 2, replace=False) for _ in range(70)], axis=1), axis=0)
-    edges = edges_of(rays, ends, field.at(xy), rng.uniform(0.1, 1, (F, len(ends))))
+    first, second = ends.T
+    middles = (rays[:, :, first] + rays[:, :, second]) / 2
+    B = np.stack([field.at(places) for places in (xy[:, first], (xy[:, first] + xy[:, second]) / 2, xy[:, second])])
+    edges = edges_of(rays, middles, ends, B, rng.uniform(0.1, 1, (F, len(ends))))
     return edges, field.stiffness, 0.1 * rng.standard_normal((F, R))
 
 
@@ -28,6 +32,18 @@ def test_derivatives_of_log_lengths_are_exact(rng: np.random.Generator) -> None:
     step, d = 1e-6, rng.standard_normal(c.shape)
     numeric = (edges.log_lengths(c + step * d) - edges.log_lengths(c - step * d)) / (2 * step)
     np.testing.assert_allclose(np.einsum("fnr,fr->fn", edges.derivatives(c), d), numeric, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("bend", [0.3, 0.6, 0.9])
+def test_length_of_an_edge_is_that_of_the_bent_line_not_of_its_chord(bend: float) -> None:
+    turns = np.array([-bend, 0.0, bend])  # on a cylinder of radius 1, its axis across, five away from the camera
+    points = np.stack([np.sin(turns), np.zeros(3), 6 - np.cos(turns)])
+    rays, depths = points / points[2], points[2]
+    B = np.eye(3)[:, None]  # log depths themselves are the coefficients
+    edges = edges_of(rays[None][:, :, [0, 2]], rays[None][:, :, 1:2], np.array([[0, 1]]), B, np.ones((1, 1)))
+    length = float(np.exp(edges.log_lengths(np.log(depths)[None])[0, 0]))
+    chord = 2 * np.sin(bend)
+    assert abs(length - 2 * bend) < 0.05 * (2 * bend - chord)
 
 
 @settings(max_examples=10, deadline=None)
