@@ -1,7 +1,7 @@
 """What the object is, by its keyframes: which kind of thing, its rest shape, its camera, and its shape in any frame."""
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
@@ -138,7 +138,7 @@ def map_of(
         if kind == "flat" or (given is not None and kind != "sheet"):
             return None
         if kind == "sheet":
-            found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=last)
+            found = sheet_map(W, camera, whole(), evidence, start, estimate_focal=estimate_focal, given=given, last=last)
         else:
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
@@ -180,18 +180,17 @@ def sheet_map(
     camera: Camera,
     found: IsometricSheet,
     evidence: Evidence,
+    start: Start = at_once,
     *,
     estimate_focal: bool,
     given: RestShape | None = None,
     last: bool,
 ) -> Map:
     """The map of a sheet: its rest shape is the one given, else the keyframe's shape that is nearest to all others."""
-    if estimate_focal and camera.perspective:
-        search = focal(found)
-        if search.known:
-            found = under(found, search.focal_px)
-            camera = found.camera
-    found = bundled(found, W, BUNDLE_ROUNDS if last else FEW_ROUNDS)
+    finish = partial(bundled, W=W, rounds=BUNDLE_ROUNDS if last else FEW_ROUNDS)
+    search = focal(found) if estimate_focal and camera.perspective else None
+    found = under(found, search.focal_px, finish, start) if search and search.known else finish(found)
+    camera = found.camera if search and search.known else camera
     shapes = found.shapes()
     known = np.isfinite(shapes).all(axis=(0, 1))
     middle = medoid(shapes[:, :, known])

@@ -7,6 +7,8 @@ does not know that the sheet keeps its lengths. A shape is S = C B, B smooth fun
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.blas import dsyrk
+from scipy.linalg.lapack import dposv
 
 from reconstruction.arrays import Array
 
@@ -65,18 +67,26 @@ def data_normal(rays: Array, weights: Array, C: Array, B: Array) -> Array:
 
 
 def stepped(C: Array, data: Array, lengths: Lengths) -> Array:
-    """Shapes C (F, 3, R) after a Gauss-Newton step towards their lengths, by the normal matrix of their data."""
+    """Shapes C (F, 3, R) after a Gauss-Newton step towards their lengths, by the normal matrix of their data.
+
+    NaN where there is no such step.
+    """
     F, _, R = C.shape
-    logs, (first, second) = lengths.now(C)
-    J = first[:, :, None] * lengths.halves[0].T + second[:, :, None] * lengths.halves[1].T  # (F, 3, R, n)
-    J = J.reshape(F, 3 * R, -1)
-    weighted = J * (lengths.weights / GIVE**2)
+    logs, slopes = lengths.now(C)
+    root = np.sqrt(lengths.weights) / GIVE
+    halves = [np.ascontiguousarray(half.T) for half in lengths.halves]
     held = np.tile(BEND * lengths.stiffness + 1e-6, 3)
-    flat = C.reshape(F, 3 * R, 1)
-    normal = data + weighted @ J.transpose(0, 2, 1)
-    gradient = data @ flat + weighted @ (logs - lengths.logs)[:, :, None] + held[:, None] * flat
-    normal[:, np.arange(3 * R), np.arange(3 * R)] += held
-    return np.asarray(C - np.linalg.solve(normal, gradient).reshape(C.shape))
+    step = np.empty((F, 3 * R))
+    for f, along in enumerate((slopes * root).swapaxes(0, 1)):
+        J = (along[0][:, None] * halves[0] + along[1][:, None] * halves[1]).reshape(3 * R, -1)
+        flat = C[f].ravel()
+        gradient = data[f] @ flat + J @ (root * (logs[f] - lengths.logs)) + held * flat
+        # One triangle of the symmetric matrix is enough for Cholesky's factors. LAPACK counts along columns.
+        normal = dsyrk(1.0, J.T, 1.0, data[f].T + np.diag(held), trans=1)
+        _, step[f], failed = dposv(normal, gradient, overwrite_a=1, overwrite_b=1)
+        if failed:
+            step[f] = np.nan
+    return C - step.reshape(C.shape)
 
 
 def places_moved(C: Array, rays: Array, weights: Array, B: Array, slopes: Array) -> Array:

@@ -1,5 +1,6 @@
 """The focal length under which a sheet keeps its lengths best."""
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ from reconstruction import ReconstructionError
 from reconstruction.mapping.isometric.adjustment import by_part, on_smooth_images, with_focal
 from reconstruction.mapping.isometric.lengths import robust_lengths
 from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.start import Start, at_once
 
 FACTORS = (0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8, 2.3, 3.0, 4.0)  # of the focal length that are tried first
 CLOSER = 1.05  # ... and then, by all frames, in steps of this factor
@@ -89,11 +91,27 @@ def closer(sheet: IsometricSheet, near_px: float) -> tuple[float, float]:
     return float(near_px * CLOSER ** (best + np.clip(lowest, -1, 1))), strain[best]
 
 
-def under(found: IsometricSheet, focal_px: float) -> IsometricSheet:
-    """A sheet under another focal length; where that is far off, started anew as well: it may have been folded wrongly."""
+def under(
+    found: IsometricSheet, focal_px: float, finish: Callable[[IsometricSheet], IsometricSheet], start: Start = at_once
+) -> IsometricSheet:
+    """A sheet under another focal length, finished; where that is far off, started anew as well: it may be folded wrongly.
+
+    Args:
+        found: the sheet under the focal length assumed so far.
+        focal_px: the other one.
+        finish: what is to be done with the sheet that keeps its lengths better.
+        start: where it is started anew, meanwhile.
+
+    Raises:
+        what `finish` raises.
+    """
     near = with_focal(found, focal_px)
     if near.strain_rms < WELL or max(focal_px, found.camera.focal_px) < FAR_OFF * min(focal_px, found.camera.focal_px):
-        return near
+        return finish(near)
+    begun, finished = start(on_smooth_images, found.warps, near.camera), at_once(finish, near)
     with suppress(ReconstructionError):
-        return min(near, on_smooth_images(found.warps, near.camera), key=typical_strain)
-    return near
+        anew: IsometricSheet = begun.result()
+        if typical_strain(anew) < typical_strain(near):
+            finished = at_once(finish, anew)
+    sheet: IsometricSheet = finished.result()
+    return sheet

@@ -39,10 +39,6 @@ class Edges:
         """The logs g (F, n) of the lengths with coefficients c (F, r)."""
         return self.logs_and_shares(c)[0]
 
-    def derivatives(self, c: Array) -> Array:
-        """Their derivatives (F, n, r) by c."""
-        return self.by_shares(self.logs_and_shares(c)[1])
-
     def by_shares(self, shares: Array) -> Array:
         """Derivatives (F, n, r) by c from those (2, F, n) by the log depths of both ends; the middle's is the rest."""
         first, middle, second = self.B
@@ -106,20 +102,18 @@ def mean_log_lengths(edges: Edges, g: Array) -> Array:
     return np.asarray((edges.weights * g).sum(axis=0) / np.maximum(total, 1e-12))
 
 
-def cost(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> float:
-    """1/N Σ w (g − mean_f g)² + 2η/N Σ w g + λ Σ_f c_fᵀ diag(stiffness) c_f, N = Σ w / F."""
-    g = edges.log_lengths(c)
+def cost(edges: Edges, g: Array, c: Array, stiffness: Array, solver: Solver) -> float:
+    """1/N Σ w (g − mean_f g)² + 2η/N Σ w g + λ Σ_f c_fᵀ diag(stiffness) c_f, N = Σ w / F, of the log lengths g of c."""
     d = g - mean_log_lengths(edges, g)
     n = edges.weights.sum() / len(c)
     bend = solver.bend * float((stiffness * c**2).sum())
     return float((edges.weights * (d**2 + 2 * solver.grow * g)).sum() / n) + bend
 
 
-def gradient(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> Array:
-    """Half the derivative (F, r) of the cost."""
-    g = edges.log_lengths(c)
+def gradient(edges: Edges, g: Array, J: Array, c: Array, stiffness: Array, solver: Solver) -> Array:
+    """Half the derivative (F, r) of the cost; J (F, n, r) are the derivatives of the log lengths g."""
     pull = edges.weights * (g - mean_log_lengths(edges, g) + solver.grow) * len(c) / edges.weights.sum()
-    return np.asarray((pull[:, None] @ edges.derivatives(c))[:, 0] + solver.bend * stiffness * c)
+    return np.asarray((pull[:, None] @ J)[:, 0] + solver.bend * stiffness * c)
 
 
 def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> Array:
@@ -132,12 +126,13 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
     w = edges.weights * F / edges.weights.sum()
     root = w / np.sqrt(np.maximum(w.sum(axis=0), 1e-12))
     c = c - c[:, :1].mean() * np.eye(r)[0]
-    before, damping = cost(edges, c, stiffness, solver), 1e-3
+    logs, shares = edges.logs_and_shares(c)
+    before, damping = cost(edges, logs, c, stiffness, solver), 1e-3
     for _ in range(solver.steps):
-        J = edges.derivatives(c)
+        J = edges.by_shares(shares)
         blocks = J.transpose(0, 2, 1) @ (w[:, :, None] * J) + np.diag(solver.bend * stiffness)
         K = root[:, :, None] * J
-        g = gradient(edges, c, stiffness, solver)
+        g = gradient(edges, logs, J, c, stiffness, solver)
         g[:, 0] -= g[:, 0].mean()  # not along the scale, which is held
         diagonal = np.einsum("frr->fr", blocks) - (K**2).sum(axis=1)
         while damping < HOPELESS:
@@ -150,7 +145,8 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
             )
             new = c - (root_of_inverse @ (y[:, 0] + shared @ Z)[:, :, None])[:, :, 0]
             new[:, 0] -= new[:, 0].mean()
-            after = cost(edges, new, stiffness, solver)
+            logs, shares = edges.logs_and_shares(new)
+            after = cost(edges, logs, new, stiffness, solver)
             if after < before:
                 break
             damping *= 10
@@ -163,20 +159,19 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
     return c
 
 
-def frame_costs(edges: Edges, logs: Array, c: Array, stiffness: Array, bend: float) -> Array:
-    """Cost (F,) of each frame by itself against known log lengths (n,)."""
-    off = (edges.weights * (edges.log_lengths(c) - logs) ** 2).sum(axis=1)
-    return np.asarray(off / np.maximum(edges.weights.sum(axis=1), 1e-12) + bend * (stiffness * c**2).sum(axis=1))
-
-
-def finish_depths(edges: Edges, logs: Array, c: Array, stiffness: Array, bend: float, steps: int = 6) -> Array:
-    """Coefficients (F, r) of frames, each by itself, with known log lengths (n,), started from c."""
+def finish_depths(
+    edges: Edges, logs: Array, c: Array, stiffness: Array, bend: float, steps: int = 6
+) -> tuple[Array, Array]:
+    """Coefficients (F, r) of frames, each by itself, with known log lengths (n,), started from c; and their costs (F,)."""
     w = edges.weights / np.maximum(edges.weights.sum(axis=1), 1e-12)[:, None]
     held = bend * stiffness
-    before = frame_costs(edges, logs, c, stiffness, bend)
-    damping = np.full(len(c), 1e-3)
+
+    def costs(g: Array, c: Array) -> Array:
+        return np.asarray((w * (g - logs) ** 2).sum(axis=1) + (held * c**2).sum(axis=1))
+
+    g, shares = edges.logs_and_shares(c)
+    before, damping = costs(g, c), np.full(len(c), 1e-3)
     for _ in range(steps):
-        g, shares = edges.logs_and_shares(c)
         J = edges.by_shares(shares)
         wJ = w[:, :, None] * J
         H = J.transpose(0, 2, 1) @ wJ
@@ -185,14 +180,16 @@ def finish_depths(edges: Edges, logs: Array, c: Array, stiffness: Array, bend: f
         diagonal += held
         diagonal += diagonal * damping[:, None] + 1e-9
         new = c - np.linalg.solve(H, right[:, :, None])[:, :, 0]
-        after = frame_costs(edges, logs, new, stiffness, bend)
+        there, its_shares = edges.logs_and_shares(new)
+        after = costs(there, new)
         better = after < before
         done = bool((before - after < ENOUGH * before).all())
-        c, before = np.where(better[:, None], new, c), np.where(better, after, before)
+        c, g, shares = (np.where(better[:, None], *pair) for pair in ((new, c), (there, g), (its_shares, shares)))
+        before = np.where(better, after, before)
         if done and better.all():
             break
         damping = np.where(better, np.maximum(damping / 5, 1e-9), damping * 10)
-    return c
+    return c, before
 
 
 def best_start(edges: Edges, logs: Array, starts: list[Array], stiffness: Array, bend: float, steps: int = 8) -> Array:
@@ -204,14 +201,13 @@ def best_start(edges: Edges, logs: Array, starts: list[Array], stiffness: Array,
 
     def finished(starts: list[Array], steps: int) -> tuple[Array, Indices]:
         if len(frames) * len(starts) > TOGETHER:
-            ends = np.stack([finish_depths(edges, logs, c, stiffness, bend, steps) for c in starts])
+            each = [finish_depths(edges, logs, c, stiffness, bend, steps) for c in starts]
+            ends, costs = (np.stack(part) for part in zip(*each, strict=True))
         else:
             many = edges.frames(np.tile(frames, len(starts)))
-            ends = finish_depths(many, logs, np.concatenate(starts), stiffness, bend, steps).reshape(
-                len(starts), *starts[0].shape
-            )
-        order = np.stack([frame_costs(edges, logs, c, stiffness, bend) for c in ends]).argsort(axis=0)
-        return ends, order
+            found = finish_depths(many, logs, np.concatenate(starts), stiffness, bend, steps)
+            ends, costs = (part.reshape(len(starts), len(frames), *part.shape[1:]) for part in found)
+        return ends, costs.argsort(axis=0)
 
     if len(starts) > LEFT:
         ends, order = finished(starts, FIRST_STEPS)

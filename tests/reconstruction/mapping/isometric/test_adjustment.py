@@ -115,7 +115,7 @@ def test_lengths_hold_the_focal_length(off: float) -> None:
     search = focal(wrong)
     assert search.known
     assert search.focal_px == pytest.approx(CAMERA.focal_px, rel=0.05)
-    assert error(under(wrong, search.focal_px), S) < 0.02
+    assert error(under(wrong, search.focal_px, lambda sheet: sheet), S) < 0.02
 
 
 def test_what_cannot_be_done_is_said() -> None:
