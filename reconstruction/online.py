@@ -15,6 +15,7 @@ from reconstruction.basis.rest_shape import RestShape, scaled_to
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.foresight import Foresight
+from reconstruction.mapping.isometric.one_frame import Foreseen
 from reconstruction.mapping.map import Map, ratio_of_sizes
 from reconstruction.mapping.mapper import FEWEST_POINTS, Mapper
 from reconstruction.mapping.start import at_once
@@ -93,7 +94,7 @@ class Reconstruction:
         self._last: ShapeEstimate | None = None
         self._restart = False
         self._foresight = Foresight(at_once)
-        self._usual = 0.0  # change of a sheet's lengths
+        self._foreseen: Foreseen | None = None  # in the last frame
 
     @property
     def phase(self) -> Phase:
@@ -210,10 +211,9 @@ class Reconstruction:
         expected, foreseen = None, self._foresight.next()
         if self.deformation == "inextensible":
             if foreseen is None or seen is not frame:
-                foreseen = self.map.foreseen([(seen.W, seen.visible)], self._usual)[0]
-            self._usual = foreseen.usual if foreseen else self._usual
+                foreseen = self.map.foreseen([(seen.W, seen.visible)], self._foreseen)[0]
             expected = self.map.expected(self.window.model, foreseen, self.window.state)
-        self._last = self.window.advance(seen.W, seen.visible, expected)
+        self._foreseen, self._last = foreseen, self.window.advance(seen.W, seen.visible, expected)
         if seen is frame:
             return self._last
         return replace(self._last, visible=frame.visible, residual_px=np.full_like(self._last.residual_px, np.nan))
@@ -227,7 +227,7 @@ class Reconstruction:
             found = found.scaled(ratio_of_sizes(before.model.basis.rest, found.rest.motion.shape))
             if last is not None and not found.camera.perspective:
                 found = found.turned_like(last.shape)
-        self.map, self.camera, rest = found, found.camera, found.rest
+        self.map, self.camera, rest, self._foreseen = found, found.camera, found.rest, None
         sheet = rest.flat or found.sheet is not None
         self.deformation = constraints.fitting(self.settings.deformation, flat=sheet)
         self.metric = distances.fitting(self.settings.metric, flat=sheet)

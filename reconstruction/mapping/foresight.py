@@ -4,7 +4,7 @@ from collections import deque
 from concurrent.futures import Future
 
 from reconstruction.arrays import Array, Mask
-from reconstruction.mapping.isometric.sheet import Foreseen
+from reconstruction.mapping.isometric.one_frame import Foreseen
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.start import Start
 

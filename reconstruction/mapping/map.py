@@ -13,7 +13,8 @@ from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, sheet
 from reconstruction.mapping.isometric.focal import focal, under
-from reconstruction.mapping.isometric.sheet import Foreseen, IsometricSheet
+from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
+from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, Kind, select
 from reconstruction.mapping.solid.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
@@ -52,16 +53,16 @@ class Map:
     evidence: Evidence | None = None
     seen: Mask | None = None
 
-    def foreseen(self, frames: list[tuple[Array, Mask]], usual: float = 0.0) -> list[Foreseen | None]:
-        """What `expected` finds in frames by themselves, points (2, p) px, anything where not visible (p,).
+    def foreseen(self, frames: list[tuple[Array, Mask]], last: Foreseen | None = None) -> list[Foreseen | None]:
+        """What `expected` finds in frames, one after the other, points (2, p) px, anything where not visible (p,).
 
-        None for a solid, or with too few points. `usual` is the change of lengths in the frames before.
+        None for a solid, or with too few points. `last` is what was found in the frame before.
         """
         found: list[Foreseen | None] = []
         for W, visible in frames:
             few = self.sheet is None or visible.sum() < FEWEST_POINTS
-            one = None if self.sheet is None or few else self.sheet.shape_in(np.where(visible, W, 0.0), visible, usual)
-            usual = usual if one is None else one.usual
+            one = None if self.sheet is None or few else shape_in(self.sheet, np.where(visible, W, 0.0), visible, last)
+            last = one or last
             found.append(one)
         return found
 

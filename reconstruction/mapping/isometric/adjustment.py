@@ -24,6 +24,7 @@ from reconstruction.mapping.isometric.lengths import (
     usual,
 )
 from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_of, on_edges, rays_of
+from reconstruction.mapping.isometric.one_frame import DOUBTED, best_of_starts
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
 from reconstruction.mapping.isometric.warps import Warps, smooth_warps
@@ -136,7 +137,26 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
         before, shapes = shapes, C @ found.functions.T
         if np.sqrt(np.nanmean((shapes - before) ** 2)) < SETTLED * np.nanstd(before):
             break
-    return found.with_shapes(shapes)
+    C = mended(found, C, W, weights)
+    return replace(found.with_shapes(C @ found.functions.T), usual_change=float(np.median(found.length_change(C))))
+
+
+def mended(found: IsometricSheet, C: Array, W: Array, weights: Array) -> Array:
+    """Coefficients C (F, 3, R) of bundled keyframes, those in doubt started again from others.
+
+    Args:
+        found: the sheet, its lengths by these shapes.
+        C: as above.
+        W: (F, 2, p) px; finite.
+        weights: (F, p) px⁻².
+    """
+    change, C = found.length_change(C), C.copy()
+    doubtful = change > DOUBTED * np.median(change)
+    others, images = found.in_frames(np.flatnonzero(~doubtful)), found.warps.images()
+    for k in np.flatnonzero(doubtful):
+        own = (C[k] @ found.functions.T)[None]
+        C[k] = best_of_starts(others, found.nodes.in_frames(np.array([k])), images[k], W[k], weights[k], own)
+    return C
 
 
 def described(
@@ -146,8 +166,9 @@ def described(
     edges = edges_between(nodes, on_edges(nodes, field), camera).weighted(factor)
     g = edges.log_lengths(c)
     logs = mean_log_lengths(edges, g)
-    off = g - logs
-    return IsometricSheet(warps, nodes, field, values, c, logs, factor, edges.rms(off), usual(off), SOLVER.bend, camera)
+    strain = edges.rms(g - logs)
+    median = float(np.median(strain))
+    return IsometricSheet(warps, nodes, field, values, c, logs, factor, strain, median, SOLVER.bend, camera)
 
 
 def first_depths(nodes: Nodes, seen: Edges, B: Array, stiffness: Array, camera: Camera) -> Array:

@@ -6,36 +6,16 @@ from functools import cached_property
 import numpy as np
 
 from reconstruction import ReconstructionError
-from reconstruction.arrays import Array, Mask
+from reconstruction.arrays import Array, Indices
 from reconstruction.camera import Camera
-from reconstruction.mapping.isometric.bundle import FUNCTIONS, Lengths, data_normal, stepped
-from reconstruction.mapping.isometric.convex import convex_finish
-from reconstruction.mapping.isometric.lengths import Edges, best_start
-from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, nearest, on_edges, rays_of
+from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, stepped
+from reconstruction.mapping.isometric.lengths import Edges
+from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, on_edges, rays_of
 from reconstruction.mapping.isometric.robust_fit import ENOUGH
 from reconstruction.mapping.isometric.smooth_field import SmoothField
-from reconstruction.mapping.isometric.warps import Warps, quick_fit
+from reconstruction.mapping.isometric.warps import Warps
 
-STEPS = 2  # of depths: they are only the start
-HELD = 0.03  # of the image's RMS radius: how far a point that is not seen may be off where its neighbours put it
-RENEWED = 0.3  # weight of the newest frame in the usual change of lengths
 FARTHEST = 1.5  # times as deep as before, or less deep: a step that goes further has lost its way, and is not taken
-STUCK = 1.3  # times the usual frame's change of length: a frame that may be in another minimum
-
-
-@dataclass(frozen=True)
-class Foreseen:
-    """A sheet's shape in a frame, by its lengths.
-
-    Attributes:
-        shape: (3, p) in camera axes.
-        known: (p,) which of its points are known: seen, or held by those around them.
-        usual: change of lengths up to this frame, later ones counting more.
-    """
-
-    shape: Array
-    known: Mask
-    usual: float
 
 
 @dataclass(frozen=True)
@@ -51,7 +31,7 @@ class IsometricSheet:
         log_lengths: (n,) of the nodes' edges: the metric rest shape.
         edge_weights: (n,) 1 for edges that keep their length, near 0 for those that do not.
         strain: (F,) change of length in each frame, weighted rms.
-        change: usual change of length of any edge, broken or not.
+        usual_change: median of that; once keyframes are bundled, of their bundled shapes.
         bend: weight λ of bending that the depths were found with.
         camera: the camera.
     """
@@ -64,7 +44,7 @@ class IsometricSheet:
     log_lengths: Array
     edge_weights: Array
     strain: Array
-    change: float
+    usual_change: float
     bend: float
     camera: Camera
 
@@ -90,44 +70,17 @@ class IsometricSheet:
         logs = self.lengths.now(self.shapes()[:, :, self.warps.few] @ self.projector)[0]
         return float(np.sqrt(((logs - np.median(logs, axis=0)) ** 2).mean()))
 
-    @property
-    def log_depths(self) -> Array:
-        """(F, p) of all points; NaN for points that no keyframe shows."""
-        return np.asarray(self.coefficients @ self.values.T)
-
     def shapes(self) -> Array:
         """(F, 3, p) in camera axes, of all points, also those not visible; NaN for points that no keyframe shows."""
-        return np.exp(self.log_depths)[:, None] * rays_of(self.warps.images(), self.camera)
+        return self.along_rays(self.coefficients, self.warps.images())
 
     def through(self, W: Array) -> Array:
         """(F, 3, p) in camera axes as `shapes`, with the points where the keyframes W (F, 2, p) px saw them."""
-        return np.exp(self.log_depths)[:, None] * rays_of(W, self.camera)
+        return self.along_rays(self.coefficients, W)
 
-    def shape_in(self, W: Array, visible: Mask, usual: float = 0.0) -> Foreseen:
-        """The shape in one more frame W (2, p) px, visible (p,), its lengths known.
-
-        It starts from the two keyframes that look most alike, and where both do badly from the deepest shape.
-
-        Args:
-            W: as above.
-            visible: as above.
-            usual: change of lengths in the frames before, which is not bad, if that in keyframes is less.
-        """
-        points = self.nodes.points
-        coefficients, variance, weights = quick_fit(self.warps, W, visible, points)
-        image, middles = ((B @ coefficients).T for B in (self.warps.values, self.halfway))
-        c, strain = self._depths(
-            replace(self.nodes, images=image[None, :, points], variance=variance[None], middles=middles[None]), usual
-        )
-        held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
-        known = visible | held[self.nodes.nearest(self.warps.reference)]
-        start = np.exp(c @ self.values.T) * rays_of(image[None], self.camera)[0]
-        C = self.bundled(start[None], W[None], weights[None])[0]
-        return Foreseen(
-            np.where(self.warps.placed, C @ self.functions.T, np.nan),
-            known,
-            (1 - RENEWED) * usual + RENEWED * float(strain[0]),
-        )
+    def along_rays(self, c: Array, images: Array) -> Array:
+        """Shapes (F, 3, p) by coefficients (F, r) of log depths, along the rays of images (F or 1, 2, p) px."""
+        return np.exp(c @ self.values.T)[:, None] * rays_of(images, self.camera)
 
     @cached_property
     def halfway(self) -> Array:
@@ -138,6 +91,10 @@ class IsometricSheet:
     def edges(self) -> Edges:
         """Its edges in its keyframes, weighted by whether they keep their length, too."""
         return edges_between(self.nodes, on_edges(self.nodes, self.field), self.camera).weighted(self.edge_weights)
+
+    def edges_in(self, nodes: Nodes) -> Edges:
+        """The same in other frames, by its nodes there."""
+        return edges_between(nodes, self.edges.B, self.camera).weighted(self.edge_weights)
 
     @property
     def functions(self) -> Array:
@@ -173,6 +130,21 @@ class IsometricSheet:
         good = (np.abs(np.log(np.maximum(depth, 1e-9))) < np.log(FARTHEST)).all(axis=1)  # of NaN, too, it is not
         return np.asarray(np.where(good[:, None, None], step, C))
 
+    def length_change(self, C: Array) -> Array:
+        """Change of length (F,) in shapes of coefficients C (F, 3, R), weighted rms: in bundled ones hardly by noise."""
+        off = self.lengths.now(C)[0] - self.log_lengths
+        return np.asarray(np.sqrt(off**2 @ self.edge_weights / max(float(self.edge_weights.sum()), 1e-12)))
+
+    def cost(self, C: Array, W: Array, weights: Array) -> Array:
+        """What bundling lowers (F,), bending apart; C (F, 3, R), W (2, p) px and weights (p,) of the frame seen in all."""
+        X = C @ self.functions.T
+        off = X[:, :2] / np.maximum(X[:, 2:], 1e-9) * self.camera.focal_px + self.camera.center_px[:, None] - W
+        total = float(self.edge_weights.sum())
+        return np.asarray(
+            np.where(weights > 0, weights * (off**2).sum(axis=1), 0.0).sum(axis=1)
+            + total * (self.length_change(C) / GIVE) ** 2
+        )
+
     def moved(self, places: Array) -> "IsometricSheet":
         """The same with points at other places (2, p) of the reference image."""
         warps, values = self.warps.moved(places), np.full_like(self.values, np.nan)
@@ -196,17 +168,12 @@ class IsometricSheet:
         nodes = replace(self.nodes, images=warps.images(self.nodes.points), middles=warps.images_at(self.nodes.halfway))
         return replace(self, warps=warps, nodes=nodes, coefficients=np.log(shapes[:, 2, few]) @ to_depths.T)
 
-    def _depths(self, nodes: Nodes, usual: float) -> tuple[Array, Array]:
-        """Coefficients (F, r) of log depths with which nodes keep their lengths in their images, and how well (F,)."""
-        edges = edges_between(nodes, self.edges.B, self.camera).weighted(self.edge_weights)
-        alike = nearest(nodes.images, self.nodes.images)[:, :2]
-        starts = list(self.coefficients[alike].swapaxes(0, 1))
-        c = best_start(edges, self.log_lengths, starts, self.field.stiffness, self.bend, STEPS)
-        strain = edges.rms(edges.log_lengths(c) - self.log_lengths)
-        stuck = np.flatnonzero(strain > STUCK * max(float(np.median(self.strain)), usual))
-        if len(stuck):
-            some, held, B = nodes.in_frames(stuck), edges.frames(stuck), self.values[nodes.points]
-            deepest = convex_finish(some, held, self.nodes, self.coefficients, B, self.field.stiffness, self.camera)
-            c[stuck] = best_start(held, self.log_lengths, [c[stuck], deepest], self.field.stiffness, self.bend, STEPS)
-            strain[stuck] = held.rms(held.log_lengths(c[stuck]) - self.log_lengths)
-        return c, strain
+    def in_frames(self, chosen: Indices) -> "IsometricSheet":
+        """The same by some of its keyframes, its lengths as they are."""
+        return replace(
+            self,
+            warps=self.warps.in_frames(chosen),
+            nodes=self.nodes.in_frames(chosen),
+            coefficients=self.coefficients[chosen],
+            strain=self.strain[chosen],
+        )

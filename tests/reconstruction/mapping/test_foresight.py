@@ -7,15 +7,15 @@ from reconstruction.mapping.start import at_once
 from tests.reconstruction.mapping.test_map import POINTS, waving
 
 
-def test_each_frame_gets_what_it_would_have_got_by_itself() -> None:
+def test_each_frame_gets_what_its_chunk_tells_of_it() -> None:
     W, _, found = waving()
     seen, few = np.ones(POINTS, bool), np.arange(POINTS) < 3
     frames = [(w, few if k == 2 else seen) for k, w in enumerate(W[:6])]
-    foresight = Foresight(at_once)
-    for chunk in (frames[:3], [], frames[3:]):
+    chunks, foresight = (frames[:3], [], frames[3:]), Foresight(at_once)
+    for chunk in chunks:
         foresight.begin(found, chunk)
-    for k, frame in enumerate(frames):
-        foreseen, alone = foresight.next(), found.foreseen([frame])[0]
+    for k, alone in enumerate(one for chunk in chunks for one in found.foreseen(chunk)):
+        foreseen = foresight.next()
         assert (foreseen is None, alone is None) == (k == 2,) * 2
         if foreseen is not None and alone is not None:
             np.testing.assert_array_equal(foreseen.shape, alone.shape)

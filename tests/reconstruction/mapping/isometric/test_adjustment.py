@@ -11,6 +11,7 @@ from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.isometric.adjustment import bundled, sheet
 from reconstruction.mapping.isometric.focal import focal, under
+from reconstruction.mapping.isometric.one_frame import shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 
@@ -28,7 +29,7 @@ def error(found: IsometricSheet, truth: np.ndarray) -> float:
 
 
 def in_frames(found: IsometricSheet, W: np.ndarray) -> np.ndarray:
-    return np.stack([found.shape_in(w, np.ones(W.shape[2], bool)).shape for w in W])
+    return np.stack([shape_in(found, w, np.ones(W.shape[2], bool)).shape for w in W])
 
 
 def test_shapes_come_out_of_the_images_alone() -> None:
@@ -84,6 +85,16 @@ def test_points_as_they_were_seen_and_lengths_adjusted_together_tell_more() -> N
     true = np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)).mean(axis=0)
     before, after = (np.std(one.log_lengths - true) for one in (found, together))
     assert after < 0.85 * before
+
+
+def test_a_keyframe_in_another_minimum_is_mended() -> None:
+    W, S, found = waving()
+    frame = 3
+    coefficients = found.coefficients.copy()
+    coefficients[frame] = found.coefficients[np.argmax([e3d(s[None], S[frame : frame + 1])[0] for s in found.shapes()])]
+    wrong = replace(found, coefficients=coefficients)
+    assert e3d(wrong.shapes(), S)[frame] > 0.1
+    assert e3d(bundled(wrong, W, rounds=1).shapes(), S)[frame] < 0.03
 
 
 def test_points_of_something_else_count_for_little_and_spoil_nothing() -> None:
@@ -149,7 +160,7 @@ def test_what_stretches_is_no_sheet() -> None:
 def test_points_beside_seen_ones_are_known() -> None:
     W, _, found = waving()
     x = W[0, 0]
-    known = found.shape_in(W[0], x < np.quantile(x, 0.4)).known
+    known = shape_in(found, W[0], x < np.quantile(x, 0.4)).known
     assert known[x < np.quantile(x, 0.42)].all()
 
 

@@ -1,0 +1,96 @@
+"""A sheet's shape in one frame, its lengths known: in another frame, or anew in a keyframe that is in doubt.
+
+Depths along the rays of a smooth image keep lengths about as well in a wrong minimum as in the right one, since an image
+made smooth by itself holds noise. Shapes adjusted to points and lengths at once tell them apart: where lengths change more
+than they usually do, other starts are tried.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from reconstruction.arrays import Array, Mask
+from reconstruction.mapping.isometric.convex import convex_finish
+from reconstruction.mapping.isometric.lengths import best_start, finish_depths
+from reconstruction.mapping.isometric.nodes import Nodes, nearest
+from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.isometric.warps import quick_fit
+
+HELD = 0.03  # of the image's RMS radius: how far a point that is not seen may be off where its neighbours put it
+RENEWED = 0.3  # weight of the newest frame in the usual change of lengths
+DOUBTED = 1.3  # times the usual change of length: the frame may be in another minimum
+STARTS, STEPS = 2, 2  # keyframes that a frame starts from, and steps of depths: they are only the start
+MORE_STARTS, MORE_STEPS = 6, 3  # the same in doubt
+LEFT, GO_ON = 3, 2  # so many starts go on after one step of bundling, so many steps more
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """A sheet's shape in a frame, by its lengths.
+
+    Attributes:
+        shape: (3, p) in camera axes; NaN for points that no keyframe shows.
+        known: (p,) which of its points are known: seen, or held by those around them.
+        usual: change of lengths up to this frame, later ones counting more.
+    """
+
+    shape: Array
+    known: Mask
+    usual: float
+
+
+def shape_in(sheet: IsometricSheet, W: Array, visible: Mask, last: Foreseen | None = None) -> Foreseen:
+    """The shape in one more frame W (2, p) px, visible (p,), its lengths known.
+
+    Args:
+        sheet: that, by keyframes.
+        W: as above; finite.
+        visible: as above.
+        last: the shape in the frame before: another start, where those from keyframes do badly.
+    """
+    points = sheet.nodes.points
+    coefficients, variance, weights = quick_fit(sheet.warps, W, visible, points)
+    image, middles = ((B @ coefficients).T for B in (sheet.warps.values, sheet.halfway))
+    nodes = replace(sheet.nodes, images=image[None, :, points], variance=variance[None], middles=middles[None])
+    alike = nearest(nodes.images, sheet.nodes.images)[0, :STARTS]
+    starts = [sheet.coefficients[[k]] for k in alike]
+    c = best_start(sheet.edges_in(nodes), sheet.log_lengths, starts, sheet.field.stiffness, sheet.bend, STEPS)
+    C = sheet.bundled(sheet.along_rays(c, image[None]), W[None], weights[None])
+    usual = sheet.usual_change if last is None else max(sheet.usual_change, last.usual)
+    if sheet.length_change(C)[0] > DOUBTED * usual:
+        known = [C @ sheet.functions.T] if last is None else [C @ sheet.functions.T, last.shape[None]]
+        C = best_of_starts(sheet, nodes, image, W, weights, np.concatenate(known))[None]
+    held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
+    return Foreseen(
+        np.where(sheet.warps.placed, C[0] @ sheet.functions.T, np.nan),
+        visible | held[sheet.nodes.nearest(sheet.warps.reference)],
+        (1 - RENEWED) * usual + RENEWED * float(sheet.length_change(C)[0]),
+    )
+
+
+def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, weights: Array, shapes: Array) -> Array:
+    """Coefficients (3, R) of what costs least in a frame: of shapes, of what look-alikes lead to, and of the deepest shape.
+
+    Args:
+        sheet: that, by keyframes which are not in doubt.
+        nodes: its nodes in the frame's image (F = 1).
+        image: (2, p) px, the frame's points made smooth.
+        W: (2, p) px, as they were seen; finite.
+        weights: (p,) px⁻².
+        shapes: (G, 3, p) that it may have.
+    """
+    stiffness, edges = sheet.field.stiffness, sheet.edges_in(nodes)
+    alike = nearest(nodes.images, sheet.nodes.images)[0, :MORE_STARTS]
+    values = sheet.values[nodes.points]
+    deepest = convex_finish(nodes, edges, sheet.nodes, sheet.coefficients, values, stiffness, sheet.camera)
+    starts = np.concatenate([sheet.coefficients[alike], deepest])
+    many = edges.frames(np.zeros(len(starts), np.int64))
+    c, _ = finish_depths(many, sheet.log_lengths, starts, stiffness, sheet.bend, MORE_STEPS)
+    candidates = np.concatenate([shapes, sheet.along_rays(c, image[None])])
+    for left, steps in ((LEFT, 1), (1, GO_ON)):
+        for _ in range(steps):
+            C = sheet.bundled(candidates, *(np.broadcast_to(one, (len(candidates), *one.shape)) for one in (W, weights)))
+            candidates = C @ sheet.functions.T
+        best = np.argsort(sheet.cost(C, W, weights))[:left]
+        C, candidates = C[best], candidates[best]
+    return np.asarray(C[0])
