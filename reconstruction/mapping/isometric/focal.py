@@ -108,10 +108,11 @@ def under(
     near = with_focal(found, focal_px)
     if near.strain_rms < WELL or max(focal_px, found.camera.focal_px) < FAR_OFF * min(focal_px, found.camera.focal_px):
         return finish(near)
-    begun, finished = start(on_smooth_images, found.warps, near.camera), at_once(finish, near)
+    begun = start(on_smooth_images, found.warps, near.camera)
+    meanwhile = None if begun.done() else at_once(finish, near)
     with suppress(ReconstructionError):
         anew: IsometricSheet = begun.result()
         if typical_strain(anew) < typical_strain(near):
-            finished = at_once(finish, anew)
-    sheet: IsometricSheet = finished.result()
+            return finish(anew)
+    sheet: IsometricSheet = meanwhile.result() if meanwhile else finish(near)
     return sheet

@@ -21,7 +21,8 @@ RENEWED = 0.3  # weight of the newest frame in the usual change of lengths
 DOUBTED = 1.3  # times the usual change of length: the frame may be in another minimum
 STARTS, STEPS = 2, 2  # keyframes that a frame starts from, and steps of depths: they are only the start
 MORE_STARTS, MORE_STEPS = 6, 3  # the same in doubt
-LEFT, GO_ON = 3, 2  # so many starts go on after one step of bundling, so many steps more
+ALIKE = 0.05  # of the depth's relief: shapes that differ by less are one
+MOST, BUNDLED = 4, 3  # different ones are bundled in so many steps
 
 
 @dataclass(frozen=True)
@@ -57,19 +58,27 @@ def shape_in(sheet: IsometricSheet, W: Array, visible: Mask, last: Foreseen | No
     c = best_start(sheet.edges_in(nodes), sheet.log_lengths, starts, sheet.field.stiffness, sheet.bend, STEPS)
     C = sheet.bundled(sheet.along_rays(c, image[None]), W[None], weights[None])
     usual = sheet.usual_change if last is None else max(sheet.usual_change, last.usual)
-    if sheet.length_change(C)[0] > DOUBTED * usual:
+    change = float(sheet.length_change(C)[0])
+    if change > DOUBTED * usual:
         known = [C @ sheet.functions.T] if last is None else [C @ sheet.functions.T, last.shape[None]]
-        C = best_of_starts(sheet, nodes, image, W, weights, np.concatenate(known))[None]
+        best, which = best_of_starts(sheet, nodes, image, W, weights, np.concatenate(known))
+        C = best[None]
+        # It was right before: a level that lasts is the usual one, so that not every frame is doubted.
+        change = change if which < len(known) else float(sheet.length_change(C)[0])
     held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
     return Foreseen(
         np.where(sheet.warps.placed, C[0] @ sheet.functions.T, np.nan),
         visible | held[sheet.nodes.nearest(sheet.warps.reference)],
-        (1 - RENEWED) * usual + RENEWED * float(sheet.length_change(C)[0]),
+        (1 - RENEWED) * usual + RENEWED * change,
     )
 
 
-def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, weights: Array, shapes: Array) -> Array:
+def best_of_starts(
+    sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, weights: Array, shapes: Array
+) -> tuple[Array, int]:
     """Coefficients (3, R) of what costs least in a frame: of shapes, of what look-alikes lead to, and of the deepest shape.
+
+    And which start they are from, the shapes first.
 
     Args:
         sheet: that, by keyframes which are not in doubt.
@@ -85,12 +94,17 @@ def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, 
     deepest = convex_finish(nodes, edges, sheet.nodes, sheet.coefficients, values, stiffness, sheet.camera)
     starts = np.concatenate([sheet.coefficients[alike], deepest])
     many = edges.frames(np.zeros(len(starts), np.int64))
-    c, _ = finish_depths(many, sheet.log_lengths, starts, stiffness, sheet.bend, MORE_STEPS)
-    candidates = np.concatenate([shapes, sheet.along_rays(c, image[None])])
-    for left, steps in ((LEFT, 1), (1, GO_ON)):
-        for _ in range(steps):
-            C = sheet.bundled(candidates, *(np.broadcast_to(one, (len(candidates), *one.shape)) for one in (W, weights)))
-            candidates = C @ sheet.functions.T
-        best = np.argsort(sheet.cost(C, W, weights))[:left]
-        C, candidates = C[best], candidates[best]
-    return np.asarray(C[0])
+    c, costs = finish_depths(many, sheet.log_lengths, starts, stiffness, sheet.bend, MORE_STEPS)
+    ends = np.concatenate([shapes, sheet.along_rays(c[costs.argsort()], image[None])])
+    depths = np.log(ends[:, 2, nodes.points])
+    depths = depths - depths.mean(axis=1, keepdims=True)
+    different = [0]
+    for k in range(1, len(ends)):
+        if all(np.abs(depths[k] - depths[one]).mean() > ALIKE * np.abs(depths[one]).mean() for one in different):
+            different.append(k)
+    ends = ends[different[:MOST]]
+    for _ in range(BUNDLED):
+        C = sheet.bundled(ends, *(np.broadcast_to(one, (len(ends), *one.shape)) for one in (W, weights)))
+        ends = C @ sheet.functions.T
+    best = int(sheet.cost(C, W, weights).argmin())
+    return C[best], different[best]
