@@ -22,7 +22,7 @@ DOUBTED = 1.3  # times the usual change of length: the frame may be in another m
 STARTS, STEPS = 2, 2  # keyframes that a frame starts from, and steps of depths: they are only the start
 MORE_STARTS, MORE_STEPS = 6, 3  # the same in doubt
 ALIKE = 0.05  # of the depth's relief: shapes that differ by less are one
-MOST, BUNDLED = 4, 3  # different ones are bundled in so many steps
+MOST, BUNDLED = 3, 2  # different ones are bundled in so many steps
 
 
 @dataclass(frozen=True)
@@ -58,27 +58,19 @@ def shape_in(sheet: IsometricSheet, W: Array, visible: Mask, last: Foreseen | No
     c = best_start(sheet.edges_in(nodes), sheet.log_lengths, starts, sheet.field.stiffness, sheet.bend, STEPS)
     C = sheet.bundled(sheet.along_rays(c, image[None]), W[None], weights[None])
     usual = sheet.usual_change if last is None else max(sheet.usual_change, last.usual)
-    change = float(sheet.length_change(C)[0])
-    if change > DOUBTED * usual:
+    if sheet.length_change(C)[0] > DOUBTED * usual:
         known = [C @ sheet.functions.T] if last is None else [C @ sheet.functions.T, last.shape[None]]
-        best, which = best_of_starts(sheet, nodes, image, W, weights, np.concatenate(known))
-        C = best[None]
-        # It was right before: a level that lasts is the usual one, so that not every frame is doubted.
-        change = change if which < len(known) else float(sheet.length_change(C)[0])
+        C = best_of_starts(sheet, nodes, image, W, weights, np.concatenate(known))[None]
     held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
     return Foreseen(
         np.where(sheet.warps.placed, C[0] @ sheet.functions.T, np.nan),
         visible | held[sheet.nodes.nearest(sheet.warps.reference)],
-        (1 - RENEWED) * usual + RENEWED * change,
+        (1 - RENEWED) * usual + RENEWED * float(sheet.length_change(C)[0]),
     )
 
 
-def best_of_starts(
-    sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, weights: Array, shapes: Array
-) -> tuple[Array, int]:
+def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, weights: Array, shapes: Array) -> Array:
     """Coefficients (3, R) of what costs least in a frame: of shapes, of what look-alikes lead to, and of the deepest shape.
-
-    And which start they are from, the shapes first.
 
     Args:
         sheet: that, by keyframes which are not in doubt.
@@ -106,5 +98,4 @@ def best_of_starts(
     for _ in range(BUNDLED):
         C = sheet.bundled(ends, *(np.broadcast_to(one, (len(ends), *one.shape)) for one in (W, weights)))
         ends = C @ sheet.functions.T
-    best = int(sheet.cost(C, W, weights).argmin())
-    return C[best], different[best]
+    return np.asarray(C[sheet.cost(C, W, weights).argmin()])
