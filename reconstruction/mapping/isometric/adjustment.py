@@ -1,7 +1,7 @@
 """A sheet that bends and does not stretch, from its keyframes alone: isometric adjustment along the rays.
 
-No rest shape is needed: of all smooth depths along the rays, those under which every distance between neighbours is the
-same in all keyframes. It needs a perspective camera; see `focal` in `sheet_evidence` for its focal length.
+No rest shape is needed: of all smooth depths along the rays, those under which every line between neighbours is as long in
+all keyframes. It needs a perspective camera; `focal` looks for its focal length.
 """
 
 from collections.abc import Sequence

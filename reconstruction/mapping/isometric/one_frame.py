@@ -88,7 +88,7 @@ def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, 
     many = edges.frames(np.zeros(len(starts), np.int64))
     c, costs = finish_depths(many, sheet.log_lengths, starts, stiffness, sheet.bend, MORE_STEPS)
     ends = np.concatenate([shapes, sheet.along_rays(c[costs.argsort()], image[None])])
-    depths = np.log(ends[:, 2, nodes.points])
+    depths = np.log(np.maximum(ends[:, 2, nodes.points], 1e-9))
     depths = depths - depths.mean(axis=1, keepdims=True)
     different = [0]
     for k in range(1, len(ends)):
