@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from reconstruction.mapping.isometric.max_depth import maximum_depth
+from reconstruction.mapping.isometric.convex import maximum_depth
 from reconstruction.mapping.isometric.nodes import neighbours, rays_of
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 
