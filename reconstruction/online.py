@@ -213,7 +213,7 @@ class Reconstruction:
             if foreseen is None or seen is not frame:
                 foreseen = self.map.foreseen([(seen.W, seen.visible)], self._foreseen)[0]
             expected = self.map.expected(self.window.model, foreseen, self.window.state)
-        self._foreseen, self._last = foreseen, self.window.advance(seen.W, seen.visible, expected)
+        self._foreseen, self._last = foreseen or self._foreseen, self.window.advance(seen.W, seen.visible, expected)
         if seen is frame:
             return self._last
         return replace(self._last, visible=frame.visible, residual_px=np.full_like(self._last.residual_px, np.nan))

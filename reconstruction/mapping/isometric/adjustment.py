@@ -101,7 +101,7 @@ def on_smooth_images(warps: Warps, camera: Camera) -> IsometricSheet:
 def by_part(found: IsometricSheet, part: Indices) -> IsometricSheet:
     """The sheet by some of its frames alone: depths and lengths adjusted anew from those there are."""
     nodes = found.nodes.in_frames(part)
-    edges = edges_between(nodes, on_edges(nodes, found.field), found.camera).weighted(found.edge_weights)
+    edges = found.edges_in(nodes)
     c = adjust_depths(edges, found.coefficients[part], found.field.stiffness, SOLVER)
     return described(found.warps.in_frames(part), nodes, found.field, found.values, c, found.edge_weights, found.camera)
 

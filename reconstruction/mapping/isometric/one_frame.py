@@ -51,21 +51,23 @@ def shape_in(sheet: IsometricSheet, W: Array, visible: Mask, last: Foreseen | No
     """
     points = sheet.nodes.points
     coefficients, variance, weights = quick_fit(sheet.warps, W, visible, points)
-    image, middles = ((B @ coefficients).T for B in (sheet.warps.values, sheet.halfway))
+    image, middles = ((B @ coefficients).T for B in (sheet.warps.values, sheet.at_middles))
     nodes = replace(sheet.nodes, images=image[None, :, points], variance=variance[None], middles=middles[None])
     alike = nearest(nodes.images, sheet.nodes.images)[0, :STARTS]
     starts = [sheet.coefficients[[k]] for k in alike]
     c = best_start(sheet.edges_in(nodes), sheet.log_lengths, starts, sheet.field.stiffness, sheet.bend, STEPS)
     C = sheet.bundled(sheet.along_rays(c, image[None]), W[None], weights[None])
     usual = sheet.usual_change if last is None else max(sheet.usual_change, last.usual)
-    if sheet.length_change(C)[0] > DOUBTED * usual:
+    change = sheet.length_change(C)[0]
+    if change > DOUBTED * usual:
         known = [C @ sheet.functions.T] if last is None else [C @ sheet.functions.T, last.shape[None]]
         C = best_of_starts(sheet, nodes, image, W, weights, np.concatenate(known))[None]
+        change = sheet.length_change(C)[0]
     held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
     return Foreseen(
         np.where(sheet.warps.placed, C[0] @ sheet.functions.T, np.nan),
         visible | held[sheet.nodes.nearest(sheet.warps.reference)],
-        (1 - RENEWED) * usual + RENEWED * float(sheet.length_change(C)[0]),
+        (1 - RENEWED) * usual + RENEWED * float(change),
     )
 
 

@@ -83,18 +83,23 @@ class IsometricSheet:
         return np.exp(c @ self.values.T)[:, None] * rays_of(images, self.camera)
 
     @cached_property
-    def halfway(self) -> Array:
+    def at_middles(self) -> Array:
         """(n, R) the functions that images are made of at the middles of the edges."""
         return self.warps.field.at(self.nodes.halfway)
 
     @cached_property
     def edges(self) -> Edges:
         """Its edges in its keyframes, weighted by whether they keep their length, too."""
-        return edges_between(self.nodes, on_edges(self.nodes, self.field), self.camera).weighted(self.edge_weights)
+        return self.edges_in(self.nodes)
 
     def edges_in(self, nodes: Nodes) -> Edges:
-        """The same in other frames, by its nodes there."""
-        return edges_between(nodes, self.edges.B, self.camera).weighted(self.edge_weights)
+        """The same in some frames, by its nodes there."""
+        return edges_between(nodes, self.on_edges, self.camera).weighted(self.edge_weights)
+
+    @cached_property
+    def on_edges(self) -> Array:
+        """(3, n, r) the functions that log depths are made of at first end, middle and second end of each edge."""
+        return on_edges(self.nodes, self.field)
 
     @property
     def functions(self) -> Array:
@@ -105,7 +110,7 @@ class IsometricSheet:
     def lengths(self) -> Lengths:
         """Its edges."""
         first, second = self.functions[self.nodes.points[self.nodes.ends]].swapaxes(0, 1)
-        middle = self.halfway[:, :FUNCTIONS]
+        middle = self.at_middles[:, :FUNCTIONS]
         return Lengths(
             np.stack([middle - first, second - middle]),
             self.log_lengths,
