@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
+from scipy.linalg.blas import dsyrk, dtrsm, dtrsv
+from scipy.linalg.lapack import dposv
 
 from reconstruction.arrays import Array, Indices
 
@@ -40,9 +41,14 @@ class Edges:
         return self.logs_and_shares(c)[0]
 
     def by_shares(self, shares: Array) -> Array:
-        """Derivatives (F, n, r) by c from those (2, F, n) by the log depths of both ends; the middle's is the rest."""
-        first, middle, second = self.B
-        return np.asarray(shares[0][:, :, None] * (first - middle) + (shares[1][:, :, None] * (second - middle) + middle))
+        """Derivatives (F, r, n) by c from those (2, F, n) by the log depths of both ends; the middle's is the rest."""
+        first, middle, second = (np.ascontiguousarray(B.T) for B in self.B)
+        J = np.empty((shares.shape[1], *middle.shape))
+        for one, (toward_first, toward_second) in zip(J, shares.swapaxes(0, 1), strict=True):  # stays near the processor
+            np.multiply(toward_first, first - middle, out=one)
+            one += toward_second * (second - middle)
+            one += middle
+        return J
 
     def logs_and_shares(self, c: Array) -> tuple[Array, Array]:
         """The logs g (F, n), and their derivatives (2, F, n) by the log depths of both ends."""
@@ -111,9 +117,9 @@ def cost(edges: Edges, g: Array, c: Array, stiffness: Array, solver: Solver) -> 
 
 
 def gradient(edges: Edges, g: Array, J: Array, c: Array, stiffness: Array, solver: Solver) -> Array:
-    """Half the derivative (F, r) of the cost; J (F, n, r) are the derivatives of the log lengths g."""
+    """Half the derivative (F, r) of the cost; J (F, r, n) are the derivatives of the log lengths g."""
     pull = edges.weights * (g - mean_log_lengths(edges, g) + solver.grow) * len(c) / edges.weights.sum()
-    return np.asarray((pull[:, None] @ J)[:, 0] + solver.bend * stiffness * c)
+    return np.asarray((J @ pull[:, :, None])[:, :, 0] + solver.bend * stiffness * c)
 
 
 def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> Array:
@@ -130,20 +136,21 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
     before, damping = cost(edges, logs, c, stiffness, solver), 1e-3
     for _ in range(solver.steps):
         J = edges.by_shares(shares)
-        blocks = J.transpose(0, 2, 1) @ (w[:, :, None] * J) + np.diag(solver.bend * stiffness)
-        K = root[:, :, None] * J
         g = gradient(edges, logs, J, c, stiffness, solver)
         g[:, 0] -= g[:, 0].mean()  # not along the scale, which is held
-        diagonal = np.einsum("frr->fr", blocks) - (K**2).sum(axis=1)
+        blocks = (J * w[:, None]) @ J.transpose(0, 2, 1) + np.diag(solver.bend * stiffness)
+        J *= root[:, None]
+        diagonal = np.einsum("frr->fr", blocks) - np.einsum("frn,frn->fr", J, J)
         while damping < HOPELESS:
-            D = blocks + (damping * diagonal + 1e-9)[:, :, None] * np.eye(r)
-            root_of_inverse = np.linalg.inv(np.linalg.cholesky(D)).transpose(0, 2, 1)
-            Z, y = K @ root_of_inverse, g[:, None] @ root_of_inverse  # (F, n, r), (F, 1, r)
-            through = Z.transpose(1, 0, 2).reshape(n, F * r)
-            shared = scipy.linalg.solve(
-                np.eye(n) - through @ through.T, through @ y.ravel(), assume_a="sym", check_finite=False
-            )
-            new = c - (root_of_inverse @ (y[:, 0] + shared @ Z)[:, :, None])[:, :, 0]
+            D = np.linalg.cholesky(blocks + (damping * diagonal + 1e-9)[:, :, None] * np.eye(r))
+            through, y = J.copy(), g.copy()
+            for L, part, one in zip(D, through, y, strict=True):  # L⁻¹ of them, in place: BLAS counts along columns
+                dtrsm(1.0, L.T, part.T, side=1, overwrite_b=1)
+                dtrsv(L.T, one, trans=1, overwrite_x=1)
+            through = through.reshape(F * r, n)
+            shared = dposv(dsyrk(-1.0, through.T, 1.0, np.eye(n)), through.T @ y.ravel())[1]
+            y += (through @ shared).reshape(F, r)
+            new = c - [dtrsv(L.T, one) for L, one in zip(D, y, strict=True)]
             new[:, 0] -= new[:, 0].mean()
             logs, shares = edges.logs_and_shares(new)
             after = cost(edges, logs, new, stiffness, solver)
@@ -173,9 +180,8 @@ def finish_depths(
     before, damping = costs(g, c), np.full(len(c), 1e-3)
     for _ in range(steps):
         J = edges.by_shares(shares)
-        wJ = w[:, :, None] * J
-        H = J.transpose(0, 2, 1) @ wJ
-        right = ((g - logs)[:, None] @ wJ)[:, 0] + held * c
+        right = (J @ (w * (g - logs))[:, :, None])[:, :, 0] + held * c
+        H = (J * w[:, None]) @ J.transpose(0, 2, 1)
         diagonal = np.einsum("frr->fr", H)
         diagonal += held
         diagonal += diagonal * damping[:, None] + 1e-9

@@ -43,7 +43,7 @@ def test_derivatives_of_log_lengths_are_exact(rng: np.random.Generator) -> None:
     edges, _, c = some_edges(rng)
     step, d = 1e-6, rng.standard_normal(c.shape)
     numeric = (edges.log_lengths(c + step * d) - edges.log_lengths(c - step * d)) / (2 * step)
-    np.testing.assert_allclose(np.einsum("fnr,fr->fn", derivatives(edges, c), d), numeric, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(np.einsum("frn,fr->fn", derivatives(edges, c), d), numeric, rtol=1e-5, atol=1e-6)
 
 
 @pytest.mark.parametrize("bend", [0.3, 0.6, 0.9])
