@@ -9,14 +9,14 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis import constraints, distances
-from reconstruction.basis.mesh import Mesh
-from reconstruction.basis.model import Model, build_model
+from reconstruction.basis.mesh import Mesh, ratio_of_sizes
+from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RestShape, scaled_to
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.foresight import Foresight
 from reconstruction.mapping.isometric.one_frame import Foreseen
-from reconstruction.mapping.map import Map, ratio_of_sizes
+from reconstruction.mapping.map import Map
 from reconstruction.mapping.mapper import FEWEST_POINTS, Mapper
 from reconstruction.mapping.start import at_once
 from reconstruction.settings import Deformation, Metric, Settings
@@ -227,12 +227,11 @@ class Reconstruction:
             found = found.scaled(ratio_of_sizes(before.model.basis.rest, found.rest.motion.shape))
             if last is not None and not found.camera.perspective:
                 found = found.turned_like(last.shape)
-        self.map, self.camera, rest, self._foreseen = found, found.camera, found.rest, None
-        sheet = rest.flat or found.sheet is not None
-        self.deformation = constraints.fitting(self.settings.deformation, flat=sheet)
-        self.metric = distances.fitting(self.settings.metric, flat=sheet)
-        modes = min(found.modes, rest.motion.shape.shape[1] - 1) if self.settings.modes == "auto" else self.settings.modes
-        model = build_model(rest, self.camera, modes, self.metric, self._mesh, found.seen)
+        model = None if self._mesh else found.model
+        model = model or found.modelled(self.settings, self._mesh)
+        self.map, self.camera, self._foreseen = replace(found, model=None), found.camera, None
+        self.deformation = constraints.fitting(self.settings.deformation, flat=found.is_sheet)
+        self.metric = distances.fitting(self.settings.metric, flat=found.is_sheet)
         paper = self.settings.energy == "paper"
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
         keeps_lengths = self.deformation in ("bending", "inextensible")
@@ -241,7 +240,7 @@ class Reconstruction:
             model,
             energy,
             self.settings.window,
-            rest.motion,
+            found.rest.motion,
             refine=refine,
             guide=build_guide(model, self.deformation, paper=paper),
             uncertainty=self.settings.uncertainty,

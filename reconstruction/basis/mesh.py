@@ -159,3 +159,17 @@ def locate(points: Array, mesh: Mesh, queries: Array) -> tuple[Indices, Array]:
 def cross2(a: Array, b: Array) -> Array:
     """Cross product (n,) of plane vectors (n, 2)."""
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def ratio_of_sizes(shape: Array, other: Array) -> float:
+    """How many times as long the edges of a shape (3, p) are as those of another (3, p), in the mean of logarithms."""
+    i, j = edges_in_main_plane(other).T
+    lengths = [np.linalg.norm(S[:, i] - S[:, j], axis=0) for S in (shape, other)]
+    good = (lengths[0] > 0) & (lengths[1] > 0)
+    return float(np.exp(np.mean(np.log(lengths[0][good] / lengths[1][good]))))
+
+
+def edges_in_main_plane(shape: Array) -> Indices:
+    """Edges (n, 2) of a shape's points (3, p), triangulated in its main plane."""
+    centred = shape - shape.mean(axis=1, keepdims=True)
+    return unique_edges(triangulate((np.linalg.svd(centred, full_matrices=False)[0][:, :2].T @ centred).T).faces)

@@ -12,7 +12,7 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis.constraints import CoarseEdges
 from reconstruction.basis.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges, without_strays
 from reconstruction.basis.modal_basis import ModalBasis, principal_axes
-from reconstruction.basis.rest_shape import RestShape, rms_radius
+from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
@@ -51,6 +51,10 @@ class Model:
     def scaled(self, factor: float) -> "Model":
         """The same in other units of the rest shape: so many times as many, each so much smaller."""
         return Model(replace(self.basis, rest=factor * self.basis.rest), self.mesh, self.camera, self.scale / factor)
+
+    def begun(self, motion: RigidMotion) -> "Model":
+        """The same with its rest shape posed first as in another frame."""
+        return Model(self.basis, facing(self.mesh, motion), self.camera, float(motion.s[0]))
 
     @property
     def unit(self) -> float:
@@ -160,10 +164,14 @@ def build_model(
 
 
 def triangulated(rest: RestShape) -> Mesh:
-    """A mesh of a rest shape's points in its main plane, whose outward normals face the camera in the first frame."""
+    """A mesh of a rest shape's points in its main plane, facing the camera in the first frame."""
     shape = rest.motion.shape
-    mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
-    x, y = (rest.motion.R[0] @ shape)[:2]
+    return facing(triangulate((principal_axes(shape).T @ shape)[:2].T), rest.motion)
+
+
+def facing(mesh: Mesh, motion: RigidMotion) -> Mesh:
+    """A mesh whose outward normals face the camera in the first frame."""
+    x, y = (motion.R[0] @ motion.shape)[:2]
     a, b, c = mesh.faces.T
     area = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a])
     # y points down: they do when the image winds the other way.

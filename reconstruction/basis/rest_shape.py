@@ -10,6 +10,7 @@ from reconstruction.arrays import Array, Indices, Mask
 Kind = Literal["rigid", "plane", "isometric", "mesh", "truth"]
 
 FLAT_RELIEF = 0.1  # of a shape's largest extent, below which it is a sheet
+BESIDE = 4  # known points that say where an unknown one is
 
 
 @dataclass(frozen=True)
@@ -90,3 +91,25 @@ def is_flat(shape: Array) -> bool:
 def rms_radius(shape: Array) -> float:
     """RMS distance of the points (3, p) to their centroid."""
     return float(np.sqrt(shape.var(axis=1).sum()))
+
+
+def medoid(shapes: Array) -> int:
+    """The shape (F, 3, p) that is nearest to all others, each turned as fits best."""
+    centred = shapes - shapes.mean(axis=2, keepdims=True)
+    nearness = np.linalg.svd(np.einsum("aip,bjp->abij", centred, centred), compute_uv=False).sum(axis=2)
+    size = (centred**2).sum(axis=(1, 2))
+    return int((size[:, None] + size - 2 * nearness).clip(0).sum(axis=1).argmin())
+
+
+def completed(shape: Array, like: Array) -> Array:
+    """A shape (3, p) with its unknown points, NaN, where their neighbours in another are, else at the centre."""
+    unknown = np.isnan(shape[0])
+    if not unknown.any():
+        return shape
+    whole = shape.copy()
+    whole[:, unknown] = np.nanmean(shape, axis=1)[:, None]
+    placed = unknown & np.isfinite(like[0])
+    for i in np.flatnonzero(placed):
+        beside = np.argsort(np.where(unknown, np.inf, ((like - like[:, i : i + 1]) ** 2).sum(axis=0)))[:BESIDE]
+        whole[:, i] = shape[:, beside].mean(axis=1)
+    return whole

@@ -7,9 +7,10 @@ import numpy as np
 
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
-from reconstruction.basis.mesh import triangulate, unique_edges
-from reconstruction.basis.model import Model
-from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
+from reconstruction.basis import distances
+from reconstruction.basis.mesh import Mesh, ratio_of_sizes
+from reconstruction.basis.model import Model, build_model
+from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, medoid, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, sheet
 from reconstruction.mapping.isometric.focal import focal, under
@@ -19,14 +20,13 @@ from reconstruction.mapping.selection import Evidence, Kind, select
 from reconstruction.mapping.solid.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.mapping.start import Start, at_once
-from reconstruction.settings import MORE_MODES, USUAL_MODES
+from reconstruction.settings import MORE_MODES, USUAL_MODES, Settings
 from reconstruction.state import State
 
 FEWEST_KEYFRAMES = 6
 FEWEST_POINTS = 20
 LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
 RIGID = 0.005  # residual over the size, up to which a solid is rigid enough to hold a focal length
-BESIDE = 4  # known points that say where an unknown one is
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,7 @@ class Map:
         focal_note: how the focal length was found, in words; empty if it was not looked for.
         evidence: what keyframes say for it, half against half; None before there are enough of them.
         seen: (K, p) what the keyframes show; None where it is not by keyframes.
+        model: the rest shape with its modes, once they are made.
     """
 
     rest: RestShape
@@ -52,6 +53,23 @@ class Map:
     focal_note: str = ""
     evidence: Evidence | None = None
     seen: Mask | None = None
+    model: Model | None = None
+
+    @property
+    def is_sheet(self) -> bool:
+        """Whether it is bent, not turned: a plane or a sheet."""
+        return self.rest.flat or self.sheet is not None
+
+    def modelled(self, settings: Settings, mesh: Mesh | None = None) -> Model:
+        """The rest shape with its modes; its mesh may be given.
+
+        Raises:
+            ReconstructionError: more modes are asked for than the points carry.
+        """
+        metric = distances.fitting(settings.metric, flat=self.is_sheet)
+        most = self.rest.motion.shape.shape[1] - 1
+        modes = min(self.modes, most) if settings.modes == "auto" else settings.modes
+        return build_model(self.rest, self.camera, modes, metric, mesh, self.seen)
 
     def foreseen(self, frames: list[tuple[Array, Mask]], last: Foreseen | None = None) -> list[Foreseen | None]:
         """What `expected` finds in frames, one after the other, points (2, p) px, anything where not visible (p,).
@@ -94,13 +112,19 @@ class Map:
         motion = self.rest.motion
         if (motion.R[0] @ motion.shape)[2] @ (shape[2] - shape[2].mean()) >= 0:
             return self
-        return replace(self, rest=replace(self.rest, motion=motion.mirrored()))
+        return replace(self, rest=replace(self.rest, motion=motion.mirrored()), model=None)
+
+    def in_order(self, order: Indices) -> "Map":
+        """The same, its poses in another order: the first is that of the frame where it begins."""
+        motion = self.rest.motion.in_order(order)
+        return replace(self, rest=replace(self.rest, motion=motion), model=self.model and self.model.begun(motion))
 
     def scaled(self, factor: float) -> "Map":
         """The same, so many times as large, and so many times as far away."""
         motion = self.rest.motion
         motion = RigidMotion(factor * motion.shape, motion.R, motion.s / factor, motion.t)
-        return replace(self, rest=replace(self.rest, motion=motion), unit_px=factor * self.unit_px)
+        model = self.model and self.model.scaled(factor)
+        return replace(self, rest=replace(self.rest, motion=motion), unit_px=factor * self.unit_px, model=model)
 
 
 def map_of(
@@ -212,39 +236,3 @@ def sheet_map(
     note = note if given is None else f"{given.note}; {note}"
     shape = RestShape("isometric" if given is None else given.kind, motion, note)
     return Map(shape, camera, found, unit_px, MORE_MODES, evidence=evidence)
-
-
-def medoid(shapes: Array) -> int:
-    """The shape (F, 3, p) that is nearest to all others, each turned as fits best."""
-    centred = shapes - shapes.mean(axis=2, keepdims=True)
-    nearness = np.linalg.svd(np.einsum("aip,bjp->abij", centred, centred), compute_uv=False).sum(axis=2)
-    size = (centred**2).sum(axis=(1, 2))
-    return int((size[:, None] + size - 2 * nearness).clip(0).sum(axis=1).argmin())
-
-
-def completed(shape: Array, like: Array) -> Array:
-    """A shape (3, p) with its unknown points, NaN, where their neighbours in another are, else at the centre."""
-    unknown = np.isnan(shape[0])
-    if not unknown.any():
-        return shape
-    whole = shape.copy()
-    whole[:, unknown] = np.nanmean(shape, axis=1)[:, None]
-    placed = unknown & np.isfinite(like[0])
-    for i in np.flatnonzero(placed):
-        beside = np.argsort(np.where(unknown, np.inf, ((like - like[:, i : i + 1]) ** 2).sum(axis=0)))[:BESIDE]
-        whole[:, i] = shape[:, beside].mean(axis=1)
-    return whole
-
-
-def ratio_of_sizes(shape: Array, other: Array) -> float:
-    """How many times as long the edges of a shape (3, p) are as those of another (3, p), in the mean of logarithms."""
-    i, j = mesh_edges(other).T
-    lengths = [np.linalg.norm(S[:, i] - S[:, j], axis=0) for S in (shape, other)]
-    good = (lengths[0] > 0) & (lengths[1] > 0)
-    return float(np.exp(np.mean(np.log(lengths[0][good] / lengths[1][good]))))
-
-
-def mesh_edges(shape: Array) -> Indices:
-    """Edges (n, 2) of a shape's points (3, p), triangulated in its main plane."""
-    centred = shape - shape.mean(axis=1, keepdims=True)
-    return unique_edges(triangulate((np.linalg.svd(centred, full_matrices=False)[0][:, :2].T @ centred).T).faces)

@@ -1,5 +1,6 @@
 """Mapping while frames come: the first model, and another one whenever the views have grown."""
 
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 
@@ -133,7 +134,7 @@ class Mapper:
         if self._first_job is None and (n in self._looks or self._looked < self._looks[-1] < n):
             arguments = *stacked(first), camera, self._settings, n >= self._looks[-1]
             due = self._frame + int(FIRST_LATENCY * n if self.latency else 0)
-            self._first_job = Job(self.start(bootstrap, *arguments), due)
+            self._first_job = Job(self.start(with_modes, bootstrap, self._settings, *arguments), due)
             self.first_frames = self._looked = n
 
     def _first_model(self) -> Map | None:
@@ -156,7 +157,9 @@ class Mapper:
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
             self._version, self._extent = keyframes.version, keyframes.extent
             asked = camera, self._settings.estimate_focal, self._known, at_once, self._given, self._kind
-            self._map_job = Job(self.start(map_of, *keyframes.spread()[:2], *asked), self._frame + self.latency)
+            self._map_job = Job(
+                self.start(with_modes, map_of, self._settings, *keyframes.spread()[:2], *asked), self._frame + self.latency
+            )
 
     def _another(self, begin: tuple[Array, Mask]) -> Map | None:
         """The map, once it is in force, posed first as in the frame where it begins."""
@@ -185,4 +188,10 @@ def nearest_first(found: Map, W: Array, visible: Mask) -> Map:
     image = Bundle(motion, 1 / camera.focal_px).image() + camera.center_px[:, None]
     every = np.ones((len(image), W.shape[1]), np.bool_)
     order = np.argsort(difference(np.where(visible, W, 0.0), visible, image, every), kind="stable")
-    return replace(found, rest=replace(found.rest, motion=motion.in_order(order)))
+    return found.in_order(order)
+
+
+def with_modes(make: Callable[..., Map | None], settings: Settings, *arguments: object) -> Map | None:
+    """A map that is made with its modes, so that no frame has to wait for them."""
+    found = make(*arguments)
+    return found and replace(found, model=found.modelled(settings))

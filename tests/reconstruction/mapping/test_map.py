@@ -1,15 +1,17 @@
 """What an object is by its keyframes: kind, rest shape, camera, and shapes of other frames, in any unit and camera."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
+from reconstruction.basis.mesh import ratio_of_sizes
 from reconstruction.basis.model import build_model
-from reconstruction.basis.rest_shape import given
+from reconstruction.basis.rest_shape import completed, given, medoid
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
-from reconstruction.mapping.map import Map, completed, map_of, medoid, ratio_of_sizes
+from reconstruction.mapping.map import Map, map_of
 from reconstruction.online import Reconstruction
 from reconstruction.settings import Settings
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
@@ -134,6 +136,24 @@ def test_a_map_in_another_size_is_the_same_picture() -> None:
         assert state is not None
         images.append(model.projection(state))
     np.testing.assert_allclose(images[0], images[1], atol=1e-3)
+
+
+@pytest.mark.parametrize("turned_away", [False, True])
+def test_modes_made_beforehand_are_those_made_in_time(turned_away: bool) -> None:
+    found, settings = waving()[2], Settings()
+    if turned_away:  # in the pose that comes first then, its back is seen
+        motion = found.rest.motion
+        R = np.concatenate([motion.R[:1], np.diag([-1.0, 1.0, -1.0]) @ motion.R[1:]])
+        found = replace(found, rest=replace(found.rest, motion=replace(motion, R=R)))
+    order = np.arange(len(found.rest.motion.s))[::-1]
+    beforehand = replace(found, model=found.modelled(settings)).in_order(order).scaled(3.0)
+    assert beforehand.model is not None
+    in_time = found.in_order(order).scaled(3.0).modelled(settings)
+    assert beforehand.model.scale == pytest.approx(in_time.scale)
+    np.testing.assert_array_equal(beforehand.model.mesh.faces, in_time.mesh.faces)
+    np.testing.assert_allclose(beforehand.model.basis.rest, in_time.basis.rest)
+    span, other = beforehand.model.basis.Upsilon, in_time.basis.Upsilon
+    np.testing.assert_allclose(span.T @ span, other.T @ other, atol=1e-6)
 
 
 def test_too_few_keyframes_tell_nothing() -> None:
