@@ -1,10 +1,12 @@
 """Videos keep the times of their frames."""
 
+from io import BytesIO
 from pathlib import Path
 
 import av
 import numpy as np
 import pytest
+from av.bitstream import BitStreamFilterContext
 from numpy.typing import NDArray
 
 from app.files.video_out import usual_fps, writable_video
@@ -37,6 +39,20 @@ def test_times_that_do_not_rise_go_on_at_the_usual_rate(tmp_path: Path) -> None:
     with Video(str(path)) as video:
         assert [frame.time_s for frame in video] == pytest.approx([0, 0.05, 0.1, 0.15, 0.3], abs=1e-3)
         assert video.size == (62, 48)
+
+
+def test_pictures_tell_their_rate_to_who_decodes_them_without_the_file(tmp_path: Path) -> None:
+    """Rerun's viewer does, with FFmpeg's program: by the ticks of the times, 90,000 a second, it shows none."""
+    path = tmp_path / "bare.mp4"
+    with writable_video(path, (64, 48), 20.0) as sink:
+        for k in range(30):
+            sink.write(np.full((48, 64, 3), 5 * k, np.uint8), k / 20)
+    with av.open(str(path)) as file:
+        bare = BitStreamFilterContext("h264_mp4toannexb", file.streams.video[0])
+        stream = b"".join(bytes(one) for packet in file.demux(video=0) for one in bare.filter(packet))
+    with av.open(BytesIO(stream), format="h264") as file:
+        next(file.decode(video=0))
+        assert file.streams.video[0].codec_context.framerate == 20
 
 
 def test_a_video_without_frames_leaves_nothing(tmp_path: Path) -> None:
