@@ -134,7 +134,11 @@ class Mapper:
         if self._first_job is None and (n in self._looks or self._looked < self._looks[-1] < n):
             arguments = *stacked(first), camera, self._settings, n >= self._looks[-1]
             due = self._frame + int(FIRST_LATENCY * n if self.latency else 0)
-            self._first_job = Job(self.start(with_modes, bootstrap, self._settings, *arguments), due)
+            if self._live:
+                begun = self.start(with_modes, bootstrap, self._settings, *arguments)
+            else:  # all frames wait for it, and who has no other work makes the modes sooner
+                begun = self.start(bootstrap, *arguments)
+            self._first_job = Job(begun, due)
             self.first_frames = self._looked = n
 
     def _first_model(self) -> Map | None:
@@ -157,9 +161,8 @@ class Mapper:
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
             self._version, self._extent = keyframes.version, keyframes.extent
             asked = camera, self._settings.estimate_focal, self._known, at_once, self._given, self._kind
-            self._map_job = Job(
-                self.start(with_modes, map_of, self._settings, *keyframes.spread()[:2], *asked), self._frame + self.latency
-            )
+            begun = self.start(with_modes, map_of, self._settings, *keyframes.spread()[:2], *asked)
+            self._map_job = Job(begun, self._frame + self.latency)
 
     def _another(self, begin: tuple[Array, Mask]) -> Map | None:
         """The map, once it is in force, posed first as in the frame where it begins."""
