@@ -43,10 +43,11 @@ class Edges:
     def by_shares(self, shares: Array) -> Array:
         """Derivatives (F, r, n) by c from those (2, F, n) by the log depths of both ends; the middle's is the rest."""
         first, middle, second = (np.ascontiguousarray(B.T) for B in self.B)
+        first, second = first - middle, second - middle
         J = np.empty((shares.shape[1], *middle.shape))
-        for one, (toward_first, toward_second) in zip(J, shares.swapaxes(0, 1), strict=True):  # stays near the processor
-            np.multiply(toward_first, first - middle, out=one)
-            one += toward_second * (second - middle)
+        for one, (by_first, by_second) in zip(J, shares.swapaxes(0, 1), strict=True):  # stays near the processor
+            np.multiply(by_first, first, out=one)
+            one += by_second * second
             one += middle
         return J
 
