@@ -23,7 +23,8 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.outliers import medians
 from reconstruction.mapping.solid.adjustment import Adjustment, adjust
 from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior
-from reconstruction.mapping.solid.solid import FEWEST_VIEWS, TAIL_SIGMAS, Solid, bundle_adjust
+from reconstruction.mapping.solid.placing import FEWEST_VIEWS
+from reconstruction.mapping.solid.solid import TAIL_SIGMAS, Solid, bundle_adjust
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.window.robust import deviation
 

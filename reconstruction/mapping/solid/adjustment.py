@@ -22,12 +22,13 @@ class Adjustment:
     Attributes:
         steps: most iterations.
         tolerance: relative gain below which it stops.
-        points: whether the shape is free, too.
+        points, poses: whether the shape is free; and the poses, and with both the focal length.
     """
 
     steps: int = 30
     tolerance: float = 1e-4
     points: bool = True
+    poses: bool = True
 
 
 def adjust(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior, how: Adjustment) -> tuple[Bundle, float]:
@@ -48,7 +49,7 @@ def adjust(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior, how: Ad
     for _ in range(how.steps):
         system = linearise(W, h, bundle, loss, prior)
         while damping < GIVING_UP:
-            tried = bundle.moved(*(system.step(damping) if how.points else system.pose_step(damping)))
+            tried = bundle.moved(*system.step_of(how, damping))
             after = energy(W, h, tried, loss, prior)
             if after < value:
                 break
@@ -86,8 +87,14 @@ class System:
     right_views: Array
     right_points: Array
 
+    def step_of(self, how: Adjustment, damping: float) -> tuple[Array, float, Array]:
+        """Poses (K, 6), log κ, points (3, p), of what may change."""
+        if not how.points:
+            return self.pose_step(damping)
+        return self.step(damping) if how.poses else self.point_step(damping)
+
     def step(self, damping: float) -> tuple[Array, float, Array]:
-        """Poses (K, 6), log κ, points (3, p)."""
+        """All at once."""
         points = damped(self.points, damping)
         inverse = np.linalg.inv(points)
         carried = self.between @ inverse  # (p, n, 3)
@@ -99,10 +106,15 @@ class System:
         return np.asarray(d[:-1].reshape(-1, POSE)), float(d[-1]), np.asarray((inverse @ back[:, :, None])[:, :, 0].T)
 
     def pose_step(self, damping: float) -> tuple[Array, float, Array]:
-        """The same with shape and focal length held."""
+        """With shape and focal length held."""
         n = len(self.right_views) - 1
         d = np.linalg.solve(damped(self.views[:n, :n], damping), self.right_views[:n])
         return np.asarray(d.reshape(-1, POSE)), 0.0, np.zeros((3, len(self.right_points)))
+
+    def point_step(self, damping: float) -> tuple[Array, float, Array]:
+        """With poses and focal length held."""
+        d = np.linalg.solve(damped(self.points, damping), self.right_points[:, :, None])
+        return np.zeros((len(self.right_views) // POSE, POSE)), 0.0, np.asarray(d[:, :, 0].T)
 
 
 def damped(matrix: Array, damping: float) -> Array:

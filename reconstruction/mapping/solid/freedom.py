@@ -1,5 +1,7 @@
 """How many modes a solid needs: more than usual if those predict points of the keyframes that they are not fitted to."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from reconstruction.arrays import Array, Mask
@@ -11,6 +13,7 @@ from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.solid import Solid
 from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES
 
+COUNTED = 2000  # points, at most about so many: of dense ones every so many tell as much
 COMPARED = 0.8  # of the points: no more modes can be compared
 BETTER = 0.97  # times what the usual modes leave over: less than that is worth the time of more,
 MUCH_BETTER = 0.75  # … and so many times less than those, the time of most: two to three times as much
@@ -28,15 +31,17 @@ def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera) -> int:
         solid: the rigid shape posed in the keyframes.
         camera: as it was made for.
     """
-    p = W.shape[2]
+    some = np.arange(0, W.shape[2], 1 + W.shape[2] // COUNTED)
+    W, visible, motion = W[:, :, some], visible[:, some], replace(solid.motion, shape=solid.shape[:, some])
+    p = len(some)
     most = min(MOST_MODES, int(COMPARED * p))
     if most <= USUAL_MODES:
         return USUAL_MODES
     more = min(MORE_MODES, most)
-    shape = solid.shape
+    shape = motion.shape
     modes = modal_basis(shape, triangulate((principal_axes(shape).T @ shape)[:2].T), most, "jensen-shannon").Upsilon
     functions = np.concatenate([np.full((1, p), p**-0.5), modes])
-    left = W - camera.center_px[:, None] - Bundle(solid.motion, 1 / solid.camera.focal_px).image()
+    left = W - camera.center_px[:, None] - Bundle(motion, 1 / solid.camera.focal_px).image()
     by = {count: left_over(left, visible, functions[: count + 1]) for count in (USUAL_MODES, more, most)}
     if most > more and by[more] < BETTER * by[USUAL_MODES] and by[most] < MUCH_BETTER * by[more]:
         return MOST_MODES

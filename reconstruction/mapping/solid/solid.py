@@ -14,12 +14,11 @@ from reconstruction.mapping.factorization import view_turn_degrees
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.adjustment import Adjustment, adjust
 from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior, off_plane, scaled
+from reconstruction.mapping.solid.placing import FEWEST_POINTS, FEWEST_VIEWS, dome, placed_by, placed_like, well_spread
 from reconstruction.mapping.solid.spikes import smoothed
 from reconstruction.mapping.solid.views import building_order, completed, likeness, with_unseen
 from reconstruction.window.robust import deviation
 
-FEWEST_VIEWS, FEWEST_POINTS = 3, 6
-DOME = 0.4  # height of the shape it starts from, over its RMS radius
 FIRST_VIEWS = 4  # adjusted together first; then twice as many, and so on
 TAIL_SIGMAS = 3.0  # of the residuals, where the loss leaves the parabola
 LEAST_TAIL = 0.005  # of the size: what tracks of a fine surface are off by anyway
@@ -31,6 +30,7 @@ FOCAL_PROOF = 0.01
 PLACING = Adjustment(steps=5, tolerance=1e-2, points=False)
 GROWING = Adjustment(steps=6, tolerance=1e-2)
 SETTLING = Adjustment(steps=15, tolerance=1e-3)
+JOINING = Adjustment(steps=15, tolerance=1e-3, poses=False)
 FLAT = 1e5  # weight of a depth off a plane
 FLAT_DOME = 1e-3
 ROUNDS = 3  # of the noise at the end
@@ -105,13 +105,15 @@ def bundle_adjust(
     place = np.argsort(order)[parent]
     kappa = unit / camera.focal_px
     scale = np.abs(alike.a[parent, order])
-    build = Build(W[order] / unit, visible[order].astype(np.float64), first / unit, turn, scale, place, flat)
+    whole = Build(W[order] / unit, visible[order].astype(np.float64), first / unit, turn, scale, place, flat)
+    some = well_spread(first, visible)
+    build = whole.of(some)
     domes = [dome(build.first, FLAT_DOME * bulge if flat else bulge, kappa) for bulge in ((1, -1) if kappa else (1,))]
-    starts = domes if known is None else [*domes, placed_like(build.first, known)]
+    starts = domes if known is None else [*domes, placed_like(build.first, known[:, some])]
     found = sorted((build.run(start, kappa, refine=refine_focal) for start in starts), key=lambda one: one[1])
     if kappa:
         found = sorted([*found, build.reversed(found[0][0], kappa, refine=refine_focal)], key=lambda one: one[1])
-    bundle = scaled(found[0][0], unit)
+    bundle = scaled(found[0][0] if len(some) == len(first.T) else whole.joined(found[0][0], some), unit)
     back = np.argsort(order)
     motion = bundle[back].motion.in_first_frame()
     motion = replace(motion, shape=with_unseen(motion.shape, np.asarray(visible.any(axis=0)), known))
@@ -154,6 +156,17 @@ class Build:
     def reversed(self, bundle: Bundle, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
         """From a bundle with its depth reversed, which explains distant views as well."""
         return self._settled(Bundle(bundle.motion.mirrored(), kappa), kappa, refine=refine)
+
+    def of(self, points: Indices) -> "Build":
+        """The same of some points."""
+        return replace(self, W=self.W[:, :, points], h=self.h[:, points], first=self.first[:, points])
+
+    def joined(self, bundle: Bundle, points: Indices) -> Bundle:
+        """A bundle of some points with all others where its poses place them."""
+        shape = placed_by(self.W, self.h, bundle)
+        shape[:, points] = bundle.motion.shape
+        bundle, _ = self._adjust(Bundle(replace(bundle.motion, shape=shape), bundle.kappa), bundle.kappa, JOINING)
+        return self._adjust(bundle, bundle.kappa, JOINING, redescending=True)[0]
 
     def _settled(self, bundle: Bundle, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
         bundle, value = self._adjust(bundle, kappa, SETTLING)
@@ -199,17 +212,6 @@ def prior_of(bundle: Bundle, h: Array, sigma: float, kappa: float, *, refine: bo
     return Prior(depth, focal, kappa)
 
 
-def dome(first: Array, bulge: float, kappa: float) -> RigidMotion:
-    """A shallow dome (3, p) that looks as the image (2, p), bulging from (+1) or to (-1) the camera."""
-    middle = first.mean(axis=1)
-    squares = ((first - middle[:, None]) ** 2).sum(axis=0)
-    z = bulge * DOME * (squares.mean() - squares) / np.quantile(squares, 0.9)
-    z = np.clip(z, -DOME, DOME)
-    xy = first * (1 + kappa * z)
-    t = xy.mean(axis=1)
-    return RigidMotion(np.concatenate([xy - t[:, None], z[None]]), np.eye(3)[None], np.ones(1), t[None])
-
-
 def width(shape: Array) -> float:
     """RMS extent of a shape (3, p) along its main plane, in one coordinate."""
     values = np.linalg.eigvalsh(np.cov(shape, bias=True))
@@ -233,14 +235,3 @@ def describe(W: Array, visible: Mask, bundle: Bundle, camera: Camera, bulges: tu
     if turn < TURN_DEGREES:
         note += f" (hardly turned: relief beyond {HALF_WIDTH:g} is not believed without proof)"
     return Solid(motion, replace(camera, focal_px=focal), residual, trusted, turn, depth, bulges, note)
-
-
-def placed_like(first: Array, shape: Array) -> RigidMotion:
-    """A shape (3, p) as large and turned as it looks most like the image (2, p)."""
-    t = first.mean(axis=1)
-    shape = shape - shape.mean(axis=1, keepdims=True)
-    affine = (first - t[:, None]) @ np.linalg.pinv(shape)
-    U, size, Vt = np.linalg.svd(affine, full_matrices=False)
-    rows = U @ Vt
-    turned = np.concatenate([rows, np.cross(rows[0], rows[1])[None]]) @ shape
-    return RigidMotion(float(size.mean()) * turned, np.eye(3)[None], np.ones(1), t[None])

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
-from reconstruction.arrays import Array, Mask
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.rest_shape import RigidMotion
@@ -58,20 +58,26 @@ def smoothed(W: Array, visible: Mask, bundle: Bundle, residual: Array) -> tuple[
     def spike(off: Array, tau: float) -> Mask:
         return np.asarray((np.abs(off) > max(LARGEST * deep, USUAL * tau)) & (np.abs(off) < PROVEN * np.sqrt(spread)))
 
+    edges = triangulate(shape[:2].T).edges
     for _ in range(ROUNDS):
-        D, distance = off_neighbours_plane(shape[:2], sound)
+        D, distance = off_neighbours_plane(shape[:2], edges, sound)
         off = np.abs(D @ shape[2])
         tau = max(float(np.median(off[sound] if sound.any() else off)) / 0.6745, SMOOTHEST * deep)
         weight = np.where(sound, 1 / (spread + (LEAST * tau) ** 2), 1 / deep**2)
         stiffness = D.T @ sp.diags_array((np.median(distance) / (tau * distance)) ** 2) @ D
-        z = np.asarray(spsolve((sp.diags_array(weight) + stiffness).tocsc(), weight * shape[2]))
+        z = solved((sp.diags_array(weight) + stiffness).tocsc(), weight * shape[2])
         sound = sound & ~spike(D @ z, tau)
-    D, _ = off_neighbours_plane(shape[:2], np.ones_like(sound))
+    D, _ = off_neighbours_plane(shape[:2], edges, np.ones_like(sound))
     for _ in range(ROUNDS):  # what smoothing left, most of it at the border: there, the plane would carry it off
         far = spike(D @ z, tau)
         sound = sound & ~far
-        z = z - np.where(far, off_neighbours_plane(shape[:2], sound)[0] @ z, 0.0)
+        z = z - np.where(far, off_neighbours_plane(shape[:2], edges, sound)[0] @ z, 0.0)
     return replace(bundle.motion, shape=axes @ (shape + along(information, z - shape[2]))), sound
+
+
+def solved(A: sp.csc_array, b: Array) -> Array:
+    """A⁻¹ b of a symmetric positive matrix (p, p), in an order for such ones: of dense points in a quarter of the time."""
+    return np.asarray(splu(A, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(b))
 
 
 def point_information(W: Array, h: Array, bundle: Bundle) -> Array:
@@ -94,14 +100,14 @@ def along(information: Array, change: Array) -> Array:
     return np.concatenate([beside, change[None]])
 
 
-def off_neighbours_plane(points: Array, sound: Mask) -> tuple[sp.csr_array, Array]:
+def off_neighbours_plane(points: Array, edges: Indices, sound: Mask) -> tuple[sp.csr_array, Array]:
     """D (p, p), so that D z are distances from the planes through the neighbours, and the neighbours' mean distance (p,).
 
-    Neighbours of points (2, p) are those of the Delaunay mesh and theirs. Points that are not sound (p,) hardly count as
-    neighbours, and are compared with the mean of theirs instead: a plane would carry them off beyond the last sound point.
+    Neighbours of points (2, p) are those along a mesh's edges (n, 2), and theirs. Points that are not sound (p,) hardly
+    count as neighbours, and are compared with the mean of theirs instead: a plane would carry them off beyond the last
+    sound point.
     """
     p = points.shape[1]
-    edges = triangulate(points.T).edges
     near = sp.coo_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(p, p))
     ring = ((near + near.T) + sp.eye_array(p)).tocsr()
     i, j = (ring @ ring).tocoo().coords
@@ -125,5 +131,5 @@ def off_neighbours_plane(points: Array, sound: Mask) -> tuple[sp.csr_array, Arra
 def worst_spike(shape: Array) -> float:
     """Largest distance of a vertex (3, p) from its neighbours' plane over the shape's width."""
     shape = principal_axes(shape).T @ shape
-    D, _ = off_neighbours_plane(shape[:2], np.ones(shape.shape[1], bool))
+    D, _ = off_neighbours_plane(shape[:2], triangulate(shape[:2].T).edges, np.ones(shape.shape[1], bool))
     return float(np.abs(D @ shape[2]).max() / np.ptp(shape[:2], axis=1).mean())

@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import distance_matrix
+from scipy.spatial.distance import cdist
 
 from reconstruction import ReconstructionError
 from reconstruction.basis import distances
-from reconstruction.basis.mesh import triangulate
+from reconstruction.basis.mesh import farthest_points, triangulate
+from reconstruction.basis.rest_shape import rms_radius
 from reconstruction.settings import Metric
 from tests.reconstruction.world import SEEDS, flat, random_rotation, relief
 
@@ -20,6 +22,16 @@ NO_EDGES = np.empty((0, 2), np.int64)
 def test_euclidean_agrees_with_scipy(rng: np.random.Generator, p: int) -> None:
     rest = rng.normal(size=(3, p))
     np.testing.assert_allclose(distances.euclidean(rest), distance_matrix(rest.T, rest.T), atol=1e-12)
+
+
+@given(SEEDS, st.integers(4, 40))
+def test_jensen_shannon_agrees_with_scipy(rng: np.random.Generator, p: int) -> None:
+    rest = relief(rng, p)
+    landmarks = rest[:, farthest_points(rest.T, distances.LANDMARKS)]
+    weights = np.exp(-0.5 * (distance_matrix(rest.T, landmarks.T) / (distances.BLUR * rms_radius(rest))) ** 2)
+    expected = cdist(weights, weights, "jensenshannon")  # it makes them shares
+    np.testing.assert_allclose(distances.jensen_shannon(rest), expected, atol=1e-7)
+    np.testing.assert_allclose(distances.jensen_shannon(rest, np.arange(3)), expected[:, :3], atol=1e-7)
 
 
 def floyd_warshall(rest: np.ndarray, edges: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import with_missing, with_outliers
+from reconstruction.mapping.solid.placing import MOST_POINTS, well_spread
 from reconstruction.mapping.solid.solid import bundle_adjust
 from tests.reconstruction.world import CAMERAS, ORTHOGRAPHIC, PERSPECTIVE, SEEDS, relief, seen, shape_error, turns
 
@@ -97,6 +98,20 @@ def test_large_turns_come_back_from_views_out_of_order():
     shape, W, visible = views(rng, PERSPECTIVE, degrees=50)
     order = rng.permutation(KEYFRAMES)
     assert shape_error(bundle_adjust(W[order], visible, PERSPECTIVE).shape, shape) < 0.012
+
+
+@given(SEEDS, CAMERAS)
+@settings(max_examples=2, deadline=None)
+def test_of_dense_points_those_placed_afterwards_are_as_good(rng, camera):
+    points = MOST_POINTS + 500
+    shape = relief(rng, points)
+    W, _ = seen(np.repeat(shape[None], KEYFRAMES, axis=0), turns(KEYFRAMES), camera)
+    visible = with_missing(np.ones((KEYFRAMES, points), bool), 0.3, rng)
+    W = np.where(visible[:, None], with_outliers(W + 0.2 * rng.normal(size=W.shape), visible, 0.05, rng), np.nan)
+    solid = bundle_adjust(W, visible, camera)
+    apart = np.setdiff1d(np.arange(points), well_spread(shape[:2], visible))
+    assert len(apart) == 500
+    assert shape_error(solid.shape[:, apart], shape[:, apart]) < 0.02
 
 
 def test_too_few_views_or_points_say_so():

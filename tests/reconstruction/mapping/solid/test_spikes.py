@@ -1,5 +1,6 @@
 import numpy as np
 
+from reconstruction.basis.mesh import triangulate
 from reconstruction.evaluation import with_outliers
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.mapping.solid.spikes import off_neighbours_plane, worst_spike
@@ -8,14 +9,14 @@ from tests.reconstruction.world import PERSPECTIVE, relief, seen, shape_error, s
 
 def test_a_plane_is_on_its_neighbours_plane():
     points = spread(np.random.default_rng(0), 80)
-    D, distance = off_neighbours_plane(points, np.ones(80, bool))
+    D, distance = off_neighbours_plane(points, triangulate(points.T).edges, np.ones(80, bool))
     np.testing.assert_allclose(D @ (3 * points[0] - 2 * points[1] + 5), 0, atol=2e-3)
     assert (distance > 0).all()
 
 
 def test_a_vertex_out_of_its_neighbours_plane_shows():
     points = spread(np.random.default_rng(0), 80)
-    D, _ = off_neighbours_plane(points, np.ones(80, bool))
+    D, _ = off_neighbours_plane(points, triangulate(points.T).edges, np.ones(80, bool))
     z = np.zeros(80)
     z[40] = 1.0
     assert (D @ z)[40] == max(D @ z) > 0.9
@@ -24,7 +25,7 @@ def test_a_vertex_out_of_its_neighbours_plane_shows():
 def test_points_on_top_of_each_other():
     points = spread(np.random.default_rng(0), 80)
     points[:, 1] = points[:, 0]
-    D, _ = off_neighbours_plane(points, np.ones(80, bool))
+    D, _ = off_neighbours_plane(points, triangulate(points.T).edges, np.ones(80, bool))
     assert np.isfinite(D.toarray()).all()
 
 

@@ -1,0 +1,57 @@
+"""Which points of a solid are adjusted together, the shapes that this starts from, and where the other points are."""
+
+import numpy as np
+
+from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.basis.mesh import farthest_points
+from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.mapping.solid.bundle import Bundle
+
+FEWEST_VIEWS, FEWEST_POINTS = 3, 6
+MOST_POINTS = 1000  # are adjusted together with the poses; of dense ones the others are placed afterwards
+DOME = 0.4  # height of the shape it starts from, over its RMS radius
+
+
+def well_spread(first: Array, visible: Mask) -> Indices:
+    """Those of points (2, p) with visibility (K, p) that are adjusted together, ascending."""
+    often = np.flatnonzero(visible.sum(axis=0) >= FEWEST_VIEWS)
+    if first.shape[1] <= MOST_POINTS:
+        return np.arange(first.shape[1])
+    return np.sort(often[farthest_points(first[:, often].T, MOST_POINTS)])
+
+
+def dome(first: Array, bulge: float, kappa: float) -> RigidMotion:
+    """A shallow dome (3, p) that looks as the image (2, p), bulging from (+1) or to (-1) the camera."""
+    middle = first.mean(axis=1)
+    squares = ((first - middle[:, None]) ** 2).sum(axis=0)
+    z = bulge * DOME * (squares.mean() - squares) / np.quantile(squares, 0.9)
+    z = np.clip(z, -DOME, DOME)
+    xy = first * (1 + kappa * z)
+    t = xy.mean(axis=1)
+    return RigidMotion(np.concatenate([xy - t[:, None], z[None]]), np.eye(3)[None], np.ones(1), t[None])
+
+
+def placed_like(first: Array, shape: Array) -> RigidMotion:
+    """A shape (3, p) as large and turned as it looks most like the image (2, p)."""
+    t = first.mean(axis=1)
+    shape = shape - shape.mean(axis=1, keepdims=True)
+    affine = (first - t[:, None]) @ np.linalg.pinv(shape)
+    U, size, Vt = np.linalg.svd(affine, full_matrices=False)
+    rows = U @ Vt
+    turned = np.concatenate([rows, np.cross(rows[0], rows[1])[None]]) @ shape
+    return RigidMotion(float(size.mean()) * turned, np.eye(3)[None], np.ones(1), t[None])
+
+
+def placed_by(W: Array, h: Array, bundle: Bundle) -> Array:
+    """Points (3, p) where views (K, 2, p) with weights (K, p) see them, by linear least squares; unseen ones in the middle.
+
+    Of a view (s R_xy − κ u s R_z) X = u − t.
+    """
+    m = bundle.motion
+    turned = m.s[:, None, None] * m.R
+    rows = turned[:, :2, :, None] - bundle.kappa * turned[:, 2:, :, None] * W[:, :, None]  # (K, 2, 3, p)
+    normal = np.einsum("kp,kuap,kubp->pab", h, rows, rows)
+    right = np.einsum("kp,kuap,kup->pa", h, rows, W - m.t[:, :, None])
+    middle = m.shape.mean(axis=1)
+    loose = 1e-6 * normal.max(initial=1e-300) * np.eye(3)
+    return np.asarray(np.linalg.solve(normal + loose, (right + loose @ middle)[:, :, None])[:, :, 0].T)
