@@ -157,7 +157,11 @@ def map_of(
         seen_by = lens(camera, W)
         whole = cache(lambda: sheet(W, visible, seen_by))
         evidence = select(
-            W, visible, camera, lambda parts: [through(by_part(whole(), part), W[part]) for part in parts], start
+            W,
+            visible,
+            camera,
+            lambda parts: ([through(by_part(whole(), part), W[part]) for part in parts], whole().strain_beyond_noise),
+            start,
         )
         kind = kind or evidence.kind
         if kind == "flat" or (given is not None and kind != "sheet"):

@@ -10,7 +10,7 @@ so that each is the noise of the tracks in pixels where the hypothesis is true.
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -21,16 +21,17 @@ from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.camera import Camera
 from reconstruction.mapping.outliers import medians
-from reconstruction.mapping.solid.adjustment import Adjustment, adjust
-from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior
 from reconstruction.mapping.solid.placing import FEWEST_VIEWS
-from reconstruction.mapping.solid.solid import TAIL_SIGMAS, Solid, bundle_adjust
+from reconstruction.mapping.solid.seen_again import image_in
+from reconstruction.mapping.solid.solid import Solid, bundle_adjust
 from reconstruction.mapping.start import Start, at_once
-from reconstruction.window.robust import deviation
 
 Kind = Literal["flat", "solid", "sheet"]
-Surface = Callable[[list[Indices]], list[tuple[Array, Array]]]
-"""Shapes (n, 3, p) of a sheet for each of several parts of the keyframes: smooth, and through the points as seen."""
+Surface = Callable[[list[Indices]], tuple[list[tuple[Array, Array]], float]]
+"""Shapes (n, 3, p) of a sheet for each of several parts of the keyframes: smooth, and through the points as seen.
+
+And by how much lengths change in all of them, rms, noise apart.
+"""
 
 COMPARED = 80  # points
 RIGID_POINTS = 150  # enough to tell how well anything rigid fits
@@ -38,12 +39,11 @@ NEIGHBOURS = 6  # of each
 OFTEN = 0.8  # of the keyframes in which a point to compare is seen
 SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
 LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
-SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave so many times less than anything rigid
+SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave so many times less than anything rigid, ...
+STRETCH_FREEDOM = 75.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane
 PLAIN = 2.0  # sureness that leaves no doubt: one half of the keyframes is enough to test rigid shapes by
 SIGMAS = 1.1774  # median of a Rayleigh distribution
 HALF_NORMAL = 0.6745  # median of a half-normal one
-ROUNDS = 4  # of robust weights of a pose
-POSES = Adjustment(steps=15, tolerance=1e-3, points=False)
 
 
 @dataclass(frozen=True)
@@ -122,32 +122,40 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     views = [(w[:, :, few], h[:, few]) for w, h in seen]
     at = np.searchsorted(few, edges)
     begun = start(rigid_by, views[0], views[1], camera, at)
-    sheet, change = Misfit(np.nan, np.nan), np.nan
+    sheet, change, stretch = Misfit(np.nan, np.nan), np.nan, 0.0
     if surface is not None:
         with suppress(ReconstructionError):  # no sheet, then
-            sheet, change = sheet_misfit(surface(halves), seen, edges)
+            shapes, stretch = surface(halves)
+            sheet, change = sheet_misfit(shapes, seen, edges)
     rigid: Rigid = begun.result()
-    kind, sureness = decide(rigid, sheet)
+    kind, sureness = decide(rigid, sheet, stretch)
     if sureness < PLAIN:
         rigid = both(rigid, rigid_by(views[1], views[0], camera, at))
-        kind, sureness = decide(rigid, sheet)
+        kind, sureness = decide(rigid, sheet, stretch)
     return Evidence(kind, rigid.flat, rigid.solid, sheet, change, sureness, rigid.turn_degrees, rigid.relief)
 
 
-def decide(rigid: Rigid, sheet: Misfit) -> tuple[Kind, float]:
+def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     """The kind, and how many times more the next best leaves.
 
-    Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges.
+    Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges. Cloth stretches a little,
+    and its waves are no relief that lasts; a face that talks passes for a sheet that stretches, but has one.
+
+    Args:
+        rigid: what rigid shapes leave over.
+        sheet: what a sheet does.
+        stretch: change of its lengths, rms, noise apart.
     """
     flat, solid = rigid.flat, rigid.solid
     gain = max(flat.whole_px, 1e-300) / max(SOLID_FREEDOM * solid.whole_px, 1e-300)
     best: Kind = "solid" if gain > 1 and rigid.relief > LEAST_RELIEF else "flat"
     rigid_px = solid.edges_px if best == "solid" else min(flat.edges_px, solid.edges_px)
-    sheet_px = SHEET_FREEDOM * sheet.edges_px
-    if sheet_px < rigid_px:
-        return "sheet", float(rigid_px / max(sheet_px, 1e-300))
-    against_sheet = np.inf if np.isnan(sheet_px) else sheet_px / max(rigid_px, 1e-300)
-    return best, float(min(max(gain, 1 / gain), against_sheet))
+    better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
+    relief = max(0.0, 1 - (solid.edges_px / max(flat.edges_px, 1e-300)) ** 2)  # of what a plane leaves, explained by it
+    freedom = SHEET_FREEDOM + STRETCH_FREEDOM * stretch * relief
+    if freedom * better < 1:
+        return "sheet", float(1 / (freedom * better))
+    return best, float(min(max(gain, 1 / gain), SHEET_FREEDOM * better))
 
 
 def rigid_by(made: tuple[Array, Mask], tested: tuple[Array, Mask], camera: Camera, edges: Indices) -> Rigid:
@@ -221,27 +229,6 @@ def spread_edges(W: Array, visible: Mask, points: Indices) -> Indices:
     i = np.repeat(np.arange(len(few)), near.shape[1])
     pairs = np.sort(np.stack([i, near.ravel()], axis=1), axis=1)
     return np.asarray(few[np.unique(pairs[pairs[:, 0] < pairs[:, 1]], axis=0)])
-
-
-def image_in(solid: Solid, W: Array, visible: Mask, camera: Camera) -> Array:
-    """Image (K, 2, p) px of a solid in other keyframes, posed as fits best, starting as the view most alike."""
-    W, h = np.where(visible[:, None], W, 0.0) - camera.center_px[:, None], visible.astype(np.float64)
-    bundle = Bundle(solid.motion, 1 / solid.camera.focal_px)
-    image, motion = bundle.image(), solid.motion
-    apart = np.where(visible[:, None, None], W[:, None] - image, np.nan)  # (K, views, 2, p)
-    shift = medians(apart, axis=3)
-    left = medians(np.linalg.norm(apart - shift[..., None], axis=2), axis=2)
-    like = left.argmin(axis=1)
-    views = np.append(0, like)  # the first keeps its turn and scale: one that counts for nothing
-    shifted = np.concatenate([np.zeros((1, 2)), shift[np.arange(len(W)), like]])
-    bundle = bundle[views]
-    bundle = replace(bundle, motion=replace(bundle.motion, t=motion.t[views] + shifted))
-    padded, counting = np.concatenate([W[:1], W]), np.concatenate([np.zeros((1, W.shape[2])), h])
-    for _ in range(ROUNDS):
-        off = np.linalg.norm(bundle.image() - padded, axis=1)[counting > 0]
-        loss = Loss(TAIL_SIGMAS * deviation(off, 1e-9 * float(np.abs(motion.shape).max())), redescending=False)
-        bundle, _ = adjust(padded, counting, bundle, loss, Prior(0.0, np.inf, bundle.kappa), POSES)
-    return bundle.image()[1:] + camera.center_px[:, None]
 
 
 def rms(values: list[float]) -> float:

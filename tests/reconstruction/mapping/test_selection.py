@@ -18,8 +18,11 @@ def keyframes(rng, shapes, camera=PERSPECTIVE, degrees=25.0, noise=0.2):
 
 
 def surface_of(placed, rng, off=0.3):
-    """What a good maker of sheets would find; seen `off` px beside it."""
-    return lambda parts: [(placed[part], placed[part] + off * rng.normal(size=(len(part), 3, P))) for part in parts]
+    """What a good maker of sheets would find, of one that does not stretch; seen `off` px beside it."""
+    return lambda parts: (
+        [(placed[part], placed[part] + off * rng.normal(size=(len(part), 3, P))) for part in parts],
+        0.0,
+    )
 
 
 @given(SEEDS)
@@ -72,15 +75,24 @@ def test_orthographic_keyframes_are_told_without_a_sheet():
 
 @given(st.floats(0.01, 100))
 def test_what_leaves_least_wins_and_freedom_costs(unit):
-    def decided(flat, solid, sheet, relief=0.4):
+    def decided(flat, solid, sheet, relief=0.4, stretch=0.0):
         made = [Misfit(unit * edges, unit * whole) for edges, whole in (flat, solid)]
-        return decide(Rigid(*made, 30.0, relief), Misfit(unit * sheet, np.nan))[0]
+        return decide(Rigid(*made, 30.0, relief), Misfit(unit * sheet, np.nan), stretch)[0]
 
     assert decided((1, 1), (1, 0.95), 0.95) == "flat"
     assert decided((1, 2), (0.5, 1), 0.48) == "solid"
     assert decided((1, 2), (0.5, 1), 0.48, relief=0.01) != "solid"
     assert decided((1, 2), (0.5, 1), 0.2) == "sheet"
     assert decided((1, 2), (0.5, 1), np.nan) == "solid"
+    assert decided((2, 4), (0.7, 2), 0.4, stretch=0.015) == "solid"  # a face that talks
+    assert decided((1, 2), (0.95, 1.9), 0.4, stretch=0.015) == "sheet"  # cloth
+
+
+def test_a_kind_that_only_the_freedom_of_another_decides_is_in_doubt():
+    rigid = Rigid(Misfit(2, 4), Misfit(0.6, 2), 30.0, 0.4)
+    kind, sureness = decide(rigid, Misfit(0.45, np.nan), stretch=0.01)
+    assert kind == "solid"
+    assert sureness < 1
 
 
 def test_edges_join_neighbours_seen_often():
