@@ -9,6 +9,7 @@ from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import Camera
+from reconstruction.mapping.keyframes import KEYFRAMES
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.solid import Solid
 from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES
@@ -23,7 +24,9 @@ def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera) -> int:
     """Number of modes for a solid.
 
     What its rigid shape leaves over in each keyframe is fitted by the modes; by generalised cross validation, more of them
-    always explain more, but only where there is a deformation do they predict more. Medians, against gross errors.
+    always explain more, but only where there is a deformation do they predict more. Medians, against gross errors. A video
+    of fewer frames than there may be keyframes has the usual number: what deforms there is seen from too few sides for its
+    depth, and more modes guess more of it.
 
     Args:
         W: (K, 2, p) px; anything where not visible.
@@ -35,7 +38,7 @@ def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera) -> int:
     W, visible, motion = W[:, :, some], visible[:, some], replace(solid.motion, shape=solid.shape[:, some])
     p = len(some)
     most = min(MOST_MODES, int(COMPARED * p))
-    if most <= USUAL_MODES:
+    if most <= USUAL_MODES or len(W) < KEYFRAMES:
         return USUAL_MODES
     more = min(MORE_MODES, most)
     shape = motion.shape

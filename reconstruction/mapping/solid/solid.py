@@ -30,7 +30,7 @@ FOCAL_PROOF = 0.01
 PLACING = Adjustment(steps=5, tolerance=1e-2, points=False)
 GROWING = Adjustment(steps=6, tolerance=1e-2)
 SETTLING = Adjustment(steps=15, tolerance=1e-3)
-JOINING = Adjustment(steps=15, tolerance=1e-3, poses=False)
+PLACING_POINTS = Adjustment(steps=15, tolerance=1e-3, poses=False)
 FLAT = 1e5  # weight of a depth off a plane
 FLAT_DOME = 1e-3
 ROUNDS = 3  # of the noise at the end
@@ -113,7 +113,7 @@ def bundle_adjust(
     found = sorted((build.run(start, kappa, refine=refine_focal) for start in starts), key=lambda one: one[1])
     if kappa:
         found = sorted([*found, build.reversed(found[0][0], kappa, refine=refine_focal)], key=lambda one: one[1])
-    bundle = scaled(found[0][0] if len(some) == len(first.T) else whole.joined(found[0][0], some), unit)
+    bundle = scaled(whole.completed(found[0][0], some), unit)
     back = np.argsort(order)
     motion = bundle[back].motion.in_first_frame()
     motion = replace(motion, shape=with_unseen(motion.shape, np.asarray(visible.any(axis=0)), known))
@@ -161,12 +161,14 @@ class Build:
         """The same of some points."""
         return replace(self, W=self.W[:, :, points], h=self.h[:, points], first=self.first[:, points])
 
-    def joined(self, bundle: Bundle, points: Indices) -> Bundle:
-        """A bundle of some points with all others where its poses place them."""
+    def completed(self, bundle: Bundle, points: Indices) -> Bundle:
+        """A bundle of some points with all of them where its poses place them, as usual of what moves beside it.
+
+        What agrees best gives the poses; of a mouth that opens and shuts, that would be its commonest place.
+        """
         shape = placed_by(self.W, self.h, bundle)
         shape[:, points] = bundle.motion.shape
-        bundle, _ = self._adjust(Bundle(replace(bundle.motion, shape=shape), bundle.kappa), bundle.kappa, JOINING)
-        return self._adjust(bundle, bundle.kappa, JOINING, redescending=True)[0]
+        return self._adjust(Bundle(replace(bundle.motion, shape=shape), bundle.kappa), bundle.kappa, PLACING_POINTS)[0]
 
     def _settled(self, bundle: Bundle, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
         bundle, value = self._adjust(bundle, kappa, SETTLING)

@@ -8,7 +8,7 @@ from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import USUAL_MODES
 from tests.reconstruction.world import PERSPECTIVE, relief, seen, turns
 
-K, P = 20, 120
+K, P = 30, 120
 
 
 @pytest.mark.parametrize("deforms", [False, True])
@@ -27,6 +27,15 @@ def test_as_many_modes_as_the_keyframes_show(deforms: bool) -> None:
     assert modes_held(np.where(visible[:, None], W, np.nan), visible, solid, PERSPECTIVE) == (
         MORE_MODES if deforms else USUAL_MODES
     )
+
+
+def test_few_keyframes_have_few_modes() -> None:
+    rng = np.random.default_rng(4)
+    shapes = relief(rng, P) + 4.0 * rng.normal(size=(K - 1, 3, P))
+    W, _ = seen(shapes, turns(K - 1), PERSPECTIVE)
+    visible = np.ones((K - 1, P), bool)
+    solid = bundle_adjust(W, visible, PERSPECTIVE, refine_focal=False)
+    assert modes_held(W, visible, solid, PERSPECTIVE) == USUAL_MODES
 
 
 def test_few_points_have_few_modes() -> None:
