@@ -17,6 +17,11 @@ from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import quaternion_exp, rotation_from_quaternion
 
 POSE = 6  # θ, t, log s of a view
+HALF_WIDTH = 0.5  # relief over width that is as deep as is believed without proof
+PROOF = 0.01  # share of the residuals that twice that relief must explain
+LOOSE = 0.3  # of one observation, says that a point is no deeper
+FOCAL_DOUBT = 0.3  # deviation of log focal length, believed as one part in FOCAL_PROOF of the observations
+FOCAL_PROOF = 0.01
 
 
 @dataclass(frozen=True)
@@ -72,11 +77,11 @@ class Loss:
     """A robust loss of a residual's length e (2-D): Geman-McClure ½ c²e²/(c² + e²), or soft-L1 c²(√(1 + e²/c²) − 1).
 
     Attributes:
-        scale: c, where it leaves the parabola.
+        scale: c, where it leaves the parabola; one, or of each point (p,).
         redescending: Geman-McClure: what is far off counts for nothing.
     """
 
-    scale: float
+    scale: float | Array
     redescending: bool
 
     def value(self, squares: Array) -> Array:
@@ -126,6 +131,16 @@ def off_plane(shape: Array, kappa: float) -> tuple[Array, Array, Array]:
     slope = nearness[:, None] * np.array([-a, -b, 1.0])
     slope[:, 2] -= kappa * nearness * off
     return np.asarray(off), slope, np.asarray(-kappa * shape[2] * nearness * off)
+
+
+def prior_of(bundle: Bundle, h: Array, sigma: float, kappa: float, *, refine: bool) -> Prior:
+    """Depths of half the width, the focal length as given; both as weak as so many observations of that noise."""
+    shape = bundle.motion.shape
+    deep = HALF_WIDTH * float(np.sqrt(np.var(shape[:2], axis=1).mean()))
+    excess = float((off_plane(shape, bundle.kappa)[0] ** 2).mean()) / deep**2
+    depth = (LOOSE + PROOF * h.sum() / len(shape.T) * excess) * (sigma / deep) ** 2
+    focal = FOCAL_PROOF * h.sum() * (sigma / FOCAL_DOUBT) ** 2 if refine and kappa else np.inf
+    return Prior(depth, focal, kappa)
 
 
 def derivatives(W: Array, bundle: Bundle) -> tuple[Array, Array, Array, Array]:

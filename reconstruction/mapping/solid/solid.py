@@ -11,22 +11,18 @@ from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.evidence import TURN_DEGREES
 from reconstruction.mapping.factorization import view_turn_degrees
-from reconstruction.mapping.outliers import without_outliers
+from reconstruction.mapping.outliers import medians, without_outliers
 from reconstruction.mapping.solid.adjustment import Adjustment, adjust
-from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior, off_plane, scaled
+from reconstruction.mapping.solid.bundle import HALF_WIDTH, Bundle, Loss, prior_of, scaled
 from reconstruction.mapping.solid.placing import FEWEST_POINTS, FEWEST_VIEWS, dome, placed_by, placed_like, well_spread
 from reconstruction.mapping.solid.spikes import smoothed
 from reconstruction.mapping.solid.views import building_order, completed, likeness, with_unseen
-from reconstruction.window.robust import deviation
+from reconstruction.window.robust import RAYLEIGH_MEDIAN, deviation
 
 FIRST_VIEWS = 4  # adjusted together first; then twice as many, and so on
 TAIL_SIGMAS = 3.0  # of the residuals, where the loss leaves the parabola
+OWN_SIGMAS = 5.0  # of a point's own residuals, where its loss does, once the poses are known
 LEAST_TAIL = 0.005  # of the size: what tracks of a fine surface are off by anyway
-HALF_WIDTH = 0.5  # relief over width that is as deep as is believed without proof
-PROOF = 0.01  # share of the residuals that twice that relief must explain
-LOOSE = 0.3  # of one observation, says that a point is no deeper
-FOCAL_DOUBT = 0.3  # deviation of log focal length, believed as one part in FOCAL_PROOF of the observations
-FOCAL_PROOF = 0.01
 PLACING = Adjustment(steps=5, tolerance=1e-2, points=False)
 GROWING = Adjustment(steps=6, tolerance=1e-2)
 SETTLING = Adjustment(steps=15, tolerance=1e-3)
@@ -162,13 +158,21 @@ class Build:
         return replace(self, W=self.W[:, :, points], h=self.h[:, points], first=self.first[:, points])
 
     def completed(self, bundle: Bundle, points: Indices) -> Bundle:
-        """A bundle of some points with all of them where its poses place them, as usual of what moves beside it.
+        """A bundle of some points with all of them where its poses place them, each as well as it moves with the others.
 
-        What agrees best gives the poses; of a mouth that opens and shuts, that would be its commonest place.
+        What agrees best gives the poses; a mouth that opens and shuts would be where it is most often, not in between.
         """
         shape = placed_by(self.W, self.h, bundle)
         shape[:, points] = bundle.motion.shape
-        return self._adjust(Bundle(replace(bundle.motion, shape=shape), bundle.kappa), bundle.kappa, PLACING_POINTS)[0]
+        bundle = Bundle(replace(bundle.motion, shape=shape), bundle.kappa)
+        for _ in range(ROUNDS):
+            residual = np.where(self.h > 0, np.linalg.norm(bundle.image() - self.W, axis=1), np.nan)
+            sigma = deviation(residual[self.h > 0], LEAST_TAIL / TAIL_SIGMAS)
+            own = np.nan_to_num(medians(residual, axis=0)) / RAYLEIGH_MEDIAN
+            bundle, _ = self._minimised(
+                bundle, Loss(OWN_SIGMAS * own.clip(sigma), True), sigma, bundle.kappa, PLACING_POINTS
+            )
+        return bundle
 
     def _settled(self, bundle: Bundle, kappa: float, *, refine: bool) -> tuple[Bundle, float]:
         bundle, value = self._adjust(bundle, kappa, SETTLING)
@@ -193,25 +197,22 @@ class Build:
     def _adjust(
         self, bundle: Bundle, kappa: float, how: Adjustment, *, refine: bool = False, redescending: bool = False
     ) -> tuple[Bundle, float]:
-        """Adjust with a loss and priors scaled to the present residuals."""
+        """Adjust with a loss and priors scaled to the residuals."""
         n = len(bundle.motion.s)
         W, h = self.W[:n], self.h[:n]
         sigma = deviation(np.linalg.norm(bundle.image() - W, axis=1)[h > 0], LEAST_TAIL / TAIL_SIGMAS)
-        loss = Loss(TAIL_SIGMAS * sigma, redescending)
+        return self._minimised(bundle, Loss(TAIL_SIGMAS * sigma, redescending), sigma, kappa, how, refine=refine)
+
+    def _minimised(
+        self, bundle: Bundle, loss: Loss, sigma: float, kappa: float, how: Adjustment, *, refine: bool = False
+    ) -> tuple[Bundle, float]:
+        """Adjust with a loss, and priors scaled to residuals of that deviation."""
+        n = len(bundle.motion.s)
+        W, h = self.W[:n], self.h[:n]
         prior = prior_of(bundle, h, sigma, kappa, refine=refine)
         prior = replace(prior, depth=FLAT) if self.flat else prior
         bundle, value = adjust(W, h, bundle, loss, prior, how)
         return bundle.centred(), value / h.sum()
-
-
-def prior_of(bundle: Bundle, h: Array, sigma: float, kappa: float, *, refine: bool) -> Prior:
-    """Depths of half the width, the focal length as given; both as weak as so many observations of that noise."""
-    shape = bundle.motion.shape
-    deep = HALF_WIDTH * float(np.sqrt(np.var(shape[:2], axis=1).mean()))
-    excess = float((off_plane(shape, bundle.kappa)[0] ** 2).mean()) / deep**2
-    depth = (LOOSE + PROOF * h.sum() / len(shape.T) * excess) * (sigma / deep) ** 2
-    focal = FOCAL_PROOF * h.sum() * (sigma / FOCAL_DOUBT) ** 2 if refine and kappa else np.inf
-    return Prior(depth, focal, kappa)
 
 
 def width(shape: Array) -> float:
