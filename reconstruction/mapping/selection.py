@@ -151,8 +151,8 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     best: Kind = "solid" if gain > 1 and rigid.relief > LEAST_RELIEF else "flat"
     rigid_px = solid.edges_px if best == "solid" else min(flat.edges_px, solid.edges_px)
     better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
-    relief = max(0.0, 1 - (solid.edges_px / max(flat.edges_px, 1e-300)) ** 2)  # of what a plane leaves, explained by it
-    freedom = SHEET_FREEDOM + STRETCH_FREEDOM * stretch * relief
+    explained = max(0.0, 1 - (solid.edges_px / max(flat.edges_px, 1e-300)) ** 2)  # by relief, of what a plane leaves
+    freedom = SHEET_FREEDOM + STRETCH_FREEDOM * stretch * explained
     if freedom * better < 1:
         return "sheet", float(1 / (freedom * better))
     return best, float(min(max(gain, 1 / gain), SHEET_FREEDOM * better))
