@@ -169,9 +169,8 @@ class Build:
             residual = np.where(self.h > 0, np.linalg.norm(bundle.image() - self.W, axis=1), np.nan)
             sigma = deviation(residual[self.h > 0], LEAST_TAIL / TAIL_SIGMAS)
             own = np.nan_to_num(medians(residual, axis=0)) / RAYLEIGH_MEDIAN
-            bundle, _ = self._minimised(
-                bundle, Loss(OWN_SIGMAS * own.clip(sigma), True), sigma, bundle.kappa, PLACING_POINTS
-            )
+            scale = TAIL_SIGMAS * sigma if self.flat else OWN_SIGMAS * own.clip(sigma)  # nothing of a plane is livelier
+            bundle, _ = self._minimised(bundle, Loss(scale, True), sigma, bundle.kappa, PLACING_POINTS)
         return bundle
 
     def _settled(self, bundle: Bundle, kappa: float, *, refine: bool) -> tuple[Bundle, float]:

@@ -171,7 +171,9 @@ def test_a_real_run_agrees_with_its_own_shapes(
     with np.load(words_out(recording, "npz")) as stored:
         assert set(truth) <= set(stored)
         for key, values in truth.items():
-            assert stored[key] == pytest.approx(values, rel=1e-4, abs=1e-6), key
+            assert stored[key] == pytest.approx(values, rel=1e-4, abs=1e-6, nan_ok=True), (
+                key
+            )  # strain of a vertex of no face
     glb = GlbFile(words_out(recording, "glb"))
     sequence = sorted(words_out(recording, "ply").glob("frame_*.ply"))
     for time_s, path, S in zip(glb.times_s, sequence, truth["S"], strict=True):
