@@ -171,14 +171,14 @@ def test_a_real_run_agrees_with_its_own_shapes(
     with np.load(words_out(recording, "npz")) as stored:
         assert set(truth) <= set(stored)
         for key, values in truth.items():
-            assert stored[key] == pytest.approx(values, rel=1e-4, abs=1e-6, nan_ok=True), (
-                key
-            )  # strain of a vertex of no face
+            # The strain of a vertex of no face is NaN.
+            assert stored[key] == pytest.approx(values, rel=1e-4, abs=1e-6, nan_ok=True), key
+        in_a_face = np.unique(stored["faces"])  # trimesh leaves out a textured vertex of no face
     glb = GlbFile(words_out(recording, "glb"))
     sequence = sorted(words_out(recording, "ply").glob("frame_*.ply"))
     for time_s, path, S in zip(glb.times_s, sequence, truth["S"], strict=True):
         assert relative(glb.vertices(time_s), S.T) < 1e-4
-        assert relative(np.asarray(trimesh.load_mesh(path, process=False).vertices), S.T) < 1e-4
+        assert relative(np.asarray(trimesh.load_mesh(path, process=False).vertices), S.T[in_a_face]) < 1e-4
     assert issues(words_out(recording, "glb", overwrite=True)) == []
 
 
