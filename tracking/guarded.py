@@ -1,6 +1,7 @@
 """A point tracker that detects the loss of the surface, and relocalises it."""
 
 from collections import deque
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import Enum
 
@@ -21,6 +22,7 @@ MIN_POINTS = 12  # fewer, and it is lost, too
 FOUND_SHARE = 0.2  # share of the points that must look right to believe that the surface is back
 SEARCH_EVERY_FRAME = 15  # so many frames it is searched for in each frame; later, to save time, ...
 SEARCH_EVERY = 5  # ... in one out of so many
+SOON_PARTLY = 0.9  # share of the points: when fewer are seen, the surface is described by its features beside the frames
 PARTLY = 0.75  # share of the points: while fewer are seen, the others are looked for by their features, too, ...
 REGAIN_EVERY, REGAIN_SELDOM = 8, 32  # ... in one out of so many frames, less and less often while that brings ...
 REGAINED = 0.02  # ... less than this share, ...
@@ -83,7 +85,7 @@ class GuardedTracker:
         self._points = points_px
         self._tracker = PointTracker(image_bgr, points_px)
         self._left_behind = LeftBehind(points_px)
-        self._relocalisation: Relocalisation | None = None
+        self._described: Future[Relocalisation] | None = None
         self._regain_every, self._partly = REGAIN_EVERY, 0  # frames; of them those in which it is seen only partly
         self._seen_then = np.ones(len(points_px), np.bool_)  # when the others were looked for
         self._shares = deque([1.0], RECENT_FRAMES)  # of the points seen in the last frames
@@ -130,7 +132,7 @@ class GuardedTracker:
         if self._good(found, SAME_SHARE * max(self._shares)) or not self._due:
             enough = self._good(found, FOUND_SHARE)
         else:
-            places = self._features.find(image_bgr)
+            places = self._describe().result().find(image_bgr)
             if places is not None:
                 relocated = self._tracker.resume(image_bgr, places)
                 if relocated.visible.sum() > found.visible.sum():
@@ -152,6 +154,8 @@ class GuardedTracker:
     def _regained(self, observation: Observation, image_bgr: Image, expected_px: Array) -> Observation:
         """With points that have come into sight far from where they were expected, if it is time to look for them."""
         share = self._share(observation)
+        if share < SOON_PARTLY:
+            self._describe()
         self._partly = self._partly + 1 if LOST_SHARE < share < PARTLY else 0
         if not self._partly:
             self._regain_every = REGAIN_EVERY
@@ -159,20 +163,21 @@ class GuardedTracker:
         if self._partly < (UNCOVERED_EVERY if moves else self._regain_every):
             return observation
         self._partly = 0
-        places = self._features.find(image_bgr, REGAIN_SIDE_PX, expected_px[~observation.visible])
+        places = self._describe().result().find(image_bgr, REGAIN_SIDE_PX, expected_px[~observation.visible])
         regained = observation if places is None else self._tracker.regain(places)
         worth = self._share(regained) > share + REGAINED
         self._regain_every = REGAIN_EVERY if worth else min(2 * self._regain_every, REGAIN_SELDOM)
         self._seen_then = regained.visible
         return regained
 
-    @property
-    def _features(self) -> Relocalisation:
-        """Finds the surface by its features; made when it is needed."""
-        if self._relocalisation is None:
-            self._relocalisation = Relocalisation(self._reference, self._points)
+    def _describe(self) -> Future[Relocalisation]:
+        """What finds the surface by its features, made when it may be needed, in a thread: it takes longer than a frame."""
+        if self._described is None:
+            pool = ThreadPoolExecutor(1)  # OpenCV holds no lock of the interpreter's
+            self._described = pool.submit(Relocalisation, self._reference, self._points)
+            pool.shutdown(wait=False)
             self._reference = self._reference[:0].copy()  # what is kept for long keeps no pictures
-        return self._relocalisation
+        return self._described
 
     @property
     def _due(self) -> bool:
