@@ -155,7 +155,7 @@ def mended(found: IsometricSheet, C: Array, W: Array, weights: Array) -> Array:
     others, images = found.in_frames(np.flatnonzero(~doubtful)), found.warps.images()
     for k in np.flatnonzero(doubtful):
         own = (C[k] @ found.functions.T)[None]
-        C[k] = best_of_starts(others, found.nodes.in_frames(np.array([k])), images[k], W[k], weights[k], own)
+        C[[k]] = best_of_starts(others, found.nodes.in_frames(np.array([k])), images[k], W[k], weights[k], own)
     return C
 
 

@@ -1,8 +1,9 @@
 """A sheet's shape in one frame, its lengths known: in another frame, or anew in a keyframe that is in doubt.
 
 Depths along the rays of a smooth image keep lengths about as well in a wrong minimum as in the right one, since an image
-made smooth by itself holds noise. Shapes adjusted to points and lengths at once tell them apart: where lengths change more
-than they usually do, other starts are tried.
+made smooth by itself holds noise. Shapes adjusted to points and lengths at once tell them apart. A frame's is the cheaper
+of those from the keyframe most alike and from the frame before; where its lengths change more than they usually do, other
+starts are tried.
 """
 
 from dataclasses import dataclass, replace
@@ -11,7 +12,7 @@ import numpy as np
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.mapping.isometric.convex import convex_finish
-from reconstruction.mapping.isometric.lengths import best_start, finish_depths
+from reconstruction.mapping.isometric.lengths import finish_depths
 from reconstruction.mapping.isometric.nodes import Nodes, nearest
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.isometric.warps import quick_fit
@@ -19,8 +20,7 @@ from reconstruction.mapping.isometric.warps import quick_fit
 HELD = 0.03  # of the image's RMS radius: how far a point that is not seen may be off where its neighbours put it
 RENEWED = 0.3  # weight of the newest frame in the usual change of lengths
 DOUBTED = 1.3  # times the usual change of length: the frame may be in another minimum
-STARTS, STEPS = 2, 2  # keyframes that a frame starts from, and steps of depths: they are only the start
-MORE_STARTS, MORE_STEPS = 6, 3  # the same in doubt
+STARTS, STEPS = 6, 3  # keyframes that a frame in doubt starts from, and steps of depths: they are only the start
 ALIKE = 0.05  # of the depth's relief: shapes that differ by less are one
 MOST, BUNDLED = 3, 2  # different ones are bundled in so many steps
 
@@ -47,21 +47,21 @@ def shape_in(sheet: IsometricSheet, W: Array, visible: Mask, last: Foreseen | No
         sheet: that, by keyframes.
         W: as above; finite.
         visible: as above.
-        last: the shape in the frame before: another start, where those from keyframes do badly.
+        last: the shape in the frame before: a start beside the depths of the keyframe that looks most alike.
     """
     points = sheet.nodes.points
     coefficients, variance, weights = quick_fit(sheet.warps, W, visible, points)
     image, middles = ((B @ coefficients).T for B in (sheet.warps.values, sheet.at_middles))
-    nodes = replace(sheet.nodes, images=image[None, :, points], variance=variance[None], middles=middles[None])
-    alike = nearest(nodes.images, sheet.nodes.images)[0, :STARTS]
-    starts = [sheet.coefficients[[k]] for k in alike]
-    c = best_start(sheet.edges_in(nodes), sheet.log_lengths, starts, sheet.field.stiffness, sheet.bend, STEPS)
-    C = sheet.bundled(sheet.along_rays(c, image[None]), W[None], weights[None])
     usual = sheet.usual_change if last is None else max(sheet.usual_change, last.usual)
+    nodes = replace(sheet.nodes, images=image[None, :, points], variance=variance[None], middles=middles[None])
+    most_alike = nearest(nodes.images, sheet.nodes.images)[0, :1]
+    shapes = sheet.along_rays(sheet.coefficients[most_alike], image[None])
+    if last is not None:
+        shapes = np.concatenate([shapes, last.shape[None]])
+    C = cheapest(sheet, shapes, W, weights)
     change = sheet.length_change(C)[0]
     if change > DOUBTED * usual:
-        known = [C @ sheet.functions.T] if last is None else [C @ sheet.functions.T, last.shape[None]]
-        C = best_of_starts(sheet, nodes, image, W, weights, np.concatenate(known))[None]
+        C = best_of_starts(sheet, nodes, image, W, weights, C @ sheet.functions.T)
         change = sheet.length_change(C)[0]
     held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
     return Foreseen(
@@ -72,7 +72,7 @@ def shape_in(sheet: IsometricSheet, W: Array, visible: Mask, last: Foreseen | No
 
 
 def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, weights: Array, shapes: Array) -> Array:
-    """Coefficients (3, R) of what costs least in a frame: of shapes, of what look-alikes lead to, and of the deepest shape.
+    """Coefficients (1, 3, R) of what costs least in a frame: of shapes, what look-alikes lead to, and the deepest shape.
 
     Args:
         sheet: that, by keyframes which are not in doubt.
@@ -83,12 +83,12 @@ def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, 
         shapes: (G, 3, p) that it may have.
     """
     stiffness, edges = sheet.field.stiffness, sheet.edges_in(nodes)
-    alike = nearest(nodes.images, sheet.nodes.images)[0, :MORE_STARTS]
+    alike = nearest(nodes.images, sheet.nodes.images)[0, :STARTS]
     values = sheet.values[nodes.points]
     deepest = convex_finish(nodes, edges, sheet.nodes, sheet.coefficients, values, stiffness, sheet.camera)
     starts = np.concatenate([sheet.coefficients[alike], deepest])
     many = edges.frames(np.zeros(len(starts), np.int64))
-    c, costs = finish_depths(many, sheet.log_lengths, starts, stiffness, sheet.bend, MORE_STEPS)
+    c, costs = finish_depths(many, sheet.log_lengths, starts, stiffness, sheet.bend, STEPS)
     ends = np.concatenate([shapes, sheet.along_rays(c[costs.argsort()], image[None])])
     depths = np.log(np.maximum(ends[:, 2, nodes.points], 1e-9))
     depths = depths - depths.mean(axis=1, keepdims=True)
@@ -96,8 +96,13 @@ def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, 
     for k in range(1, len(ends)):
         if all(np.abs(depths[k] - depths[one]).mean() > ALIKE * np.abs(depths[one]).mean() for one in different):
             different.append(k)
-    ends = ends[different[:MOST]]
+    return cheapest(sheet, ends[different[:MOST]], W, weights)
+
+
+def cheapest(sheet: IsometricSheet, shapes: Array, W: Array, weights: Array) -> Array:
+    """Coefficients (1, 3, R) of that of shapes (G, 3, p) in one frame which costs least, once they are bundled."""
+    seen = [np.broadcast_to(one, (len(shapes), *one.shape)) for one in (W, weights)]
     for _ in range(BUNDLED):
-        C = sheet.bundled(ends, *(np.broadcast_to(one, (len(ends), *one.shape)) for one in (W, weights)))
-        ends = C @ sheet.functions.T
-    return np.asarray(C[sheet.cost(C, W, weights).argmin()])
+        C = sheet.bundled(shapes, *seen)
+        shapes = C @ sheet.functions.T
+    return np.asarray(C[[sheet.cost(C, W, weights).argmin()]])
