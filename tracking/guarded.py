@@ -85,7 +85,7 @@ class GuardedTracker:
         self._points = points_px
         self._tracker = PointTracker(image_bgr, points_px)
         self._left_behind = LeftBehind(points_px)
-        self._described: Future[Relocalisation] | None = None
+        self._relocalisation: Relocalisation | Future[Relocalisation] | None = None
         self._regain_every, self._partly = REGAIN_EVERY, 0  # frames; of them those in which it is seen only partly
         self._seen_then = np.ones(len(points_px), np.bool_)  # when the others were looked for
         self._shares = deque([1.0], RECENT_FRAMES)  # of the points seen in the last frames
@@ -132,7 +132,7 @@ class GuardedTracker:
         if self._good(found, SAME_SHARE * max(self._shares)) or not self._due:
             enough = self._good(found, FOUND_SHARE)
         else:
-            places = self._describe().result().find(image_bgr)
+            places = self._features.find(image_bgr)
             if places is not None:
                 relocated = self._tracker.resume(image_bgr, places)
                 if relocated.visible.sum() > found.visible.sum():
@@ -163,21 +163,33 @@ class GuardedTracker:
         if self._partly < (UNCOVERED_EVERY if moves else self._regain_every):
             return observation
         self._partly = 0
-        places = self._describe().result().find(image_bgr, REGAIN_SIDE_PX, expected_px[~observation.visible])
+        places = self._features.find(image_bgr, REGAIN_SIDE_PX, expected_px[~observation.visible])
         regained = observation if places is None else self._tracker.regain(places)
         worth = self._share(regained) > share + REGAINED
         self._regain_every = REGAIN_EVERY if worth else min(2 * self._regain_every, REGAIN_SELDOM)
         self._seen_then = regained.visible
         return regained
 
-    def _describe(self) -> Future[Relocalisation]:
-        """What finds the surface by its features, made when it may be needed, in a thread: it takes longer than a frame."""
-        if self._described is None:
+    def _describe(self) -> None:
+        """Begin to describe the surface by its features, in a thread: it takes longer than a frame."""
+        if self._relocalisation is None:
             pool = ThreadPoolExecutor(1)  # OpenCV holds no lock of the interpreter's
-            self._described = pool.submit(Relocalisation, self._reference, self._points)
+            self._relocalisation = pool.submit(Relocalisation, self._reference, self._points)
             pool.shutdown(wait=False)
             self._reference = self._reference[:0].copy()  # what is kept for long keeps no pictures
-        return self._described
+
+    @property
+    def _features(self) -> Relocalisation:
+        """Finds the surface by its features."""
+        self._describe()
+        if isinstance(self._relocalisation, Future):
+            self._relocalisation = self._relocalisation.result()
+        assert self._relocalisation is not None
+        return self._relocalisation
+
+    def __getstate__(self) -> dict[str, object]:
+        """What goes to another process: no thread, but what it makes."""
+        return self.__dict__ | ({} if self._relocalisation is None else {"_relocalisation": self._features})
 
     @property
     def _due(self) -> bool:

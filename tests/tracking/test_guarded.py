@@ -1,5 +1,7 @@
 """Losing the surface and finding it again."""
 
+import pickle
+
 import cv2
 import numpy as np
 import pytest
@@ -83,6 +85,20 @@ def test_a_hand_at_once_over_part_of_it_is_no_loss(share: float) -> None:
         image, _ = scene(0.3)
         image[:, : int(edge)] = ELSEWHERE[:, : int(edge)]
         assert tracker.track(image).change is Change.NONE
+
+
+def test_it_goes_to_another_process_while_it_is_partly_covered() -> None:
+    tracker = followed()
+    image, truth = scene(0.3)
+    covered = image.copy()
+    edge = int(np.quantile(truth[:, 0], 0.2))
+    covered[:, :edge] = ELSEWHERE[:, :edge]
+    assert tracker.track(covered).observation.visible.mean() < 0.9  # features are described in a thread from here on
+    there = pickle.loads(pickle.dumps(tracker))
+    assert there.track(ELSEWHERE).change is Change.LOST
+    found = there.track(np.roll(image, 60, axis=1))
+    assert found.change is Change.RECOVERED
+    assert right(found, truth + np.array([60.0, 0.0]))
 
 
 def test_a_flash_costs_only_its_frames() -> None:
