@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from reconstruction.mapping.solid.freedom import MORE_MODES, modes_held
+from reconstruction.mapping.solid.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
-from reconstruction.settings import USUAL_MODES
+from reconstruction.settings import MOST_MODES, USUAL_MODES
 from tests.reconstruction.world import PERSPECTIVE, relief, seen, turns
 
 K, P = 30, 120
@@ -25,7 +25,7 @@ def test_as_many_modes_as_the_keyframes_show(deforms: bool) -> None:
     visible = rng.random((K, P)) > 0.1
     solid = bundle_adjust(W, visible, PERSPECTIVE, refine_focal=False)
     held = modes_held(np.where(visible[:, None], W, np.nan), visible, solid, PERSPECTIVE)
-    assert held >= MORE_MODES if deforms else held == USUAL_MODES
+    assert held == (MOST_MODES if deforms else USUAL_MODES)
 
 
 def test_few_keyframes_have_few_modes() -> None:
