@@ -35,7 +35,10 @@ class Relocalisation:
         hull = cv2.convexHull(points_px.astype(np.float32).reshape(-1, 1, 2))
         cv2.fillConvexPoly(mask, np.rint(hull).astype(np.int32), (255,))
         scale = min(1.0, SIDE_PX / max(mask.shape))
-        self._places, self._described = self._features(image_bgr, cv2.SIFT.create(FEATURES), mask, scale)
+        left, top, right, bottom = _around(points_px, AROUND * self._extent, image_bgr.shape)
+        cut, mask = image_bgr[top:bottom, left:right], mask[top:bottom, left:right]
+        self._places, self._described = self._features(cut, cv2.SIFT.create(FEATURES), mask, scale)
+        self._places += (left, top)
 
     def find(self, image_bgr: Image, side_px: int = SIDE_PX, near_px: Array | None = None) -> Array | None:
         """Where the points are in a picture, to some pixels: (P, 2), NaN where no match is near; None if nowhere.
@@ -52,12 +55,11 @@ class Relocalisation:
         places += (left, top)
         if len(places) < MIN_MATCHES or len(self._places) < MIN_MATCHES:
             return None
-        matches = cv2.BFMatcher(cv2.NORM_L2).knnMatch(self._described, described, k=2)
-        pairs = [(m[0].queryIdx, m[0].trainIdx) for m in matches if len(m) == 2 and m[0].distance < RATIO * m[1].distance]
+        best, distance, second = _nearest_two(self._described, described)
+        pairs = np.flatnonzero(distance < RATIO**2 * second)
         if len(pairs) < MIN_MATCHES:
             return None
-        index = np.array(pairs)
-        there, here = self._places[index[:, 0]], places[index[:, 1]]
+        there, here = self._places[pairs], places[best[pairs]]
         cv2.setRNGSeed(0)  # the same video gives the same result
         affine, agree = cv2.estimateAffine2D(there, here, ransacReprojThreshold=AFFINE_ERROR * self._extent, maxIters=4000)
         if affine is None or int(agree.sum()) < MIN_MATCHES:
@@ -70,24 +72,22 @@ class Relocalisation:
     def _bent(self, there: Array, here: Array, affine: Array, agree: Flags) -> Array | None:
         """The points under an affine map bent to the matches around each."""
         off = here - _mapped(affine, there)
+        near = self._influence(there, there)
+        np.fill_diagonal(near, 0.0)  # no match speaks for itself
+        size = float(np.sqrt(abs(np.linalg.det(affine[:, :2])))) * self._extent
         for _ in range(ROUNDS):
-            local, weight = self._interpolated(there, there[agree], off[agree], leave_out=np.flatnonzero(agree))
-            size = float(np.sqrt(abs(np.linalg.det(affine[:, :2])))) * self._extent
-            near = np.linalg.norm(off - local, axis=1) < LOCAL_ERROR * size
-            agree = np.where(weight > 1.0, near, agree) & (np.linalg.norm(off, axis=1) < 2.0 * AFFINE_ERROR * size)
+            local, weight = _mean(near * agree, off)
+            alike = np.linalg.norm(off - local, axis=1) < LOCAL_ERROR * size
+            agree = np.where(weight > 1.0, alike, agree) & (np.linalg.norm(off, axis=1) < 2.0 * AFFINE_ERROR * size)
             if agree.sum() < MIN_MATCHES:
                 return None
-        local, weight = self._interpolated(self._points, there[agree], off[agree])
+        local, weight = _mean(self._influence(self._points, there[agree]), off[agree])
         return np.where(weight[:, None] > 1e-3, _mapped(affine, self._points) + local, np.nan)
 
-    def _interpolated(self, at: Array, there: Array, off: Array, leave_out: Indices | None = None) -> tuple[Array, Array]:
-        """Weighted mean (n, 2) of `off` around places (n, 2), and their weights (n,); `leave_out` not around themselves."""
-        squared = ((at[:, None] - there[None]) ** 2).sum(axis=2)
-        w = np.exp(-0.5 * squared / (INFLUENCE * self._extent) ** 2)
-        if leave_out is not None:
-            w[leave_out, np.arange(len(leave_out))] = 0.0
-        total = w.sum(axis=1)
-        return w @ off / np.maximum(total, 1e-12)[:, None], total
+    def _influence(self, at: Array, there: Array) -> Array:
+        """Weights (n, m) at n places of what is known at m, in px of the reference."""
+        squared = (at**2).sum(axis=1)[:, None] + (there**2).sum(axis=1) - 2.0 * at @ there.T
+        return np.asarray(np.exp(-0.5 * squared / (INFLUENCE * self._extent) ** 2))
 
     def _features(self, image_bgr: Image, sift: cv2.SIFT, mask: Image | None, scale: float) -> tuple[Array, Floats]:
         gray = cv2.cvtColor(image_bgr, cv2.COLOR_BGR2GRAY)
@@ -99,6 +99,22 @@ class Relocalisation:
             return np.empty((0, 2)), np.empty((0, 128), np.float32)
         places = np.array([feature.pt for feature in found], np.float64)
         return (places + 0.5) / scale - 0.5, cast(Floats, described)
+
+
+def _mean(weights: Array, values: Array) -> tuple[Array, Array]:
+    """Weighted means (n, 2) of values (m, 2) by weights (n, m), and the sums (n,) of these."""
+    total = weights.sum(axis=1)
+    return weights @ values / np.maximum(total, 1e-12)[:, None], total
+
+
+def _nearest_two(ours: Floats, theirs: Floats) -> tuple[Indices, Floats, Floats]:
+    """Of descriptors (m, 128) the nearest to each of (n, 128), and the squared distances to it and to the next (n,)."""
+    squared = (theirs**2).sum(axis=1) - 2.0 * (ours @ theirs.T)  # integers below 2^24: exact
+    rows, best = np.arange(len(ours)), squared.argmin(axis=1)
+    nearest = squared[rows, best]
+    squared[rows, best] = np.inf
+    own = (ours**2).sum(axis=1)
+    return best, nearest + own, squared.min(axis=1) + own
 
 
 def _mapped(affine: Array, points: Array) -> Array:
