@@ -99,7 +99,7 @@ class Map:
             depth, before = shape[2] - shape[2].mean(), (last.matrices()[-1] @ model.B)[2]
             if depth @ (before - before.mean()) < 0:
                 shape[2] -= 2 * depth
-        return model.state_of(shape, self.sheet.camera, foreseen.known, last)
+        return model.state_of(shape, self.sheet.camera, self.sheet.warps.placed, last)
 
     def state_of(self, model: Model, shape: Array) -> State | None:
         """Pose and Λ' of a shape (3, p) in camera axes, px, by the modes of a sheet; None for a solid."""

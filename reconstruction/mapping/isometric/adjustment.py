@@ -126,7 +126,7 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
     W, shapes, placed = np.where(weights[:, None] > 0, W, 0.0), found.shapes(), found.warps.placed
     rays, way = rays_of(W, found.camera)[:, :2, placed], np.zeros(len(found.log_lengths))
     for k in range(rounds):
-        C = found.bundled(shapes, W, weights)
+        C = found.bundled(shapes, W, weights, found.prior_of(shapes))
         places = found.warps.reference.copy()
         slopes = found.warps.field.slopes_at(places[:, placed])[:, : C.shape[2]]
         places[:, placed] += places_moved(C, rays, weights[:, placed], found.functions[placed], slopes)

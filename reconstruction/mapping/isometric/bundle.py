@@ -11,10 +11,10 @@ from scipy.linalg.blas import dsyrk
 from scipy.linalg.lapack import dposv
 
 from reconstruction.arrays import Array
+from reconstruction.mapping.isometric.shape_prior import ShapePrior
 
 FUNCTIONS = 60
 GIVE = 0.002  # of lengths: what they change by, noise apart
-BEND = 1e3  # against the squared misfits: decides only where nothing is seen
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,8 @@ def data_normal(rays: Array, weights: Array, C: Array, B: Array) -> Array:
     return np.concatenate([np.concatenate(row, axis=2) for row in rows], axis=1)
 
 
-def stepped(C: Array, data: Array, lengths: Lengths) -> Array:
-    """Shapes C (F, 3, R) after a Gauss-Newton step towards their lengths, by the normal matrix of their data.
+def stepped(C: Array, data: Array, lengths: Lengths, prior: ShapePrior) -> Array:
+    """Shapes C (F, 3, R) after a Gauss-Newton step towards their lengths, by the data's normal matrix and what others say.
 
     NaN where there is no such step.
     """
@@ -75,14 +75,13 @@ def stepped(C: Array, data: Array, lengths: Lengths) -> Array:
     logs, slopes = lengths.now(C)
     root = np.sqrt(lengths.weights) / GIVE
     halves = [np.ascontiguousarray(half.T) for half in lengths.halves]
-    held = np.tile(BEND * lengths.stiffness + 1e-6, 3)
+    held, away = prior.at(C)
     step = np.empty((F, 3 * R))
     for f, along in enumerate((slopes * root).swapaxes(0, 1)):
         J = (along[0][:, None] * halves[0] + along[1][:, None] * halves[1]).reshape(3 * R, -1)
-        flat = C[f].ravel()
-        gradient = data[f] @ flat + J @ (root * (logs[f] - lengths.logs)) + held * flat
+        gradient = data[f] @ C[f].ravel() + J @ (root * (logs[f] - lengths.logs)) + held[f] @ away[f]
         # One triangle of the symmetric matrix is enough for Cholesky's factors. LAPACK counts along columns.
-        normal = dsyrk(1.0, J.T, 1.0, data[f].T + np.diag(held), trans=1)
+        normal = dsyrk(1.0, J.T, 1.0, data[f].T + held[f], trans=1)
         _, step[f], failed = dposv(normal, gradient, overwrite_a=1, overwrite_b=1)
         if failed:
             step[f] = np.nan

@@ -17,7 +17,6 @@ from reconstruction.mapping.isometric.nodes import Nodes, nearest
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.isometric.warps import quick_fit
 
-HELD = 0.03  # of the image's RMS radius: how far a point that is not seen may be off where its neighbours put it
 RENEWED = 0.3  # weight of the newest frame in the usual change of lengths
 DOUBTED = 1.3  # times the usual change of length: the frame may be in another minimum
 STARTS, STEPS = 6, 3  # keyframes that a frame in doubt starts from, and steps of depths: they are only the start
@@ -31,12 +30,10 @@ class Foreseen:
 
     Attributes:
         shape: (3, p) in camera axes; NaN for points that no keyframe shows.
-        known: (p,) which of its points are known: seen, or held by those around them.
         usual: change of lengths up to this frame, later ones counting more.
     """
 
     shape: Array
-    known: Mask
     usual: float
 
 
@@ -63,10 +60,8 @@ def shape_in(sheet: IsometricSheet, W: Array, visible: Mask, last: Foreseen | No
     if change > DOUBTED * usual:
         C = best_of_starts(sheet, nodes, image, W, weights, C @ sheet.functions.T)
         change = sheet.length_change(C)[0]
-    held = np.sqrt(variance) < HELD * np.sqrt(np.var(image[:, points], axis=1).sum())
     return Foreseen(
         np.where(sheet.warps.placed, C[0] @ sheet.functions.T, np.nan),
-        visible | held[sheet.nodes.nearest(sheet.warps.reference)],
         (1 - RENEWED) * usual + RENEWED * float(change),
     )
 
@@ -103,6 +98,6 @@ def cheapest(sheet: IsometricSheet, shapes: Array, W: Array, weights: Array) -> 
     """Coefficients (1, 3, R) of that of shapes (G, 3, p) in one frame which costs least, once they are bundled."""
     seen = [np.broadcast_to(one, (len(shapes), *one.shape)) for one in (W, weights)]
     for _ in range(BUNDLED):
-        C = sheet.bundled(shapes, *seen)
+        C = sheet.bundled(shapes, seen[0], seen[1], sheet.prior)
         shapes = C @ sheet.functions.T
     return np.asarray(C[[sheet.cost(C, W, weights).argmin()]])

@@ -11,8 +11,8 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, stepped
 from reconstruction.mapping.isometric.lengths import Edges
 from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, on_edges, rays_of
-from reconstruction.mapping.isometric.robust_fit import ENOUGH
-from reconstruction.mapping.isometric.smooth_field import SmoothField
+from reconstruction.mapping.isometric.shape_prior import ShapePrior, shape_prior
+from reconstruction.mapping.isometric.smooth_field import ENOUGH, SmoothField
 from reconstruction.mapping.isometric.warps import Warps
 
 FARTHEST = 1.5  # times as deep as before, or less deep: a step that goes further has lost its way, and is not taken
@@ -123,14 +123,25 @@ class IsometricSheet:
         """(m, R) what takes the few points of shapes to their coefficients."""
         return np.asarray(np.linalg.pinv(self.functions[self.warps.few]).T)
 
-    def bundled(self, shapes: Array, W: Array, weights: Array) -> Array:
+    def prior_of(self, shapes: Array, *, of_others: bool = True) -> ShapePrior:
+        """What shapes (F, 3, p) in its keyframes say of others, or of each other."""
+        few = self.warps.few
+        C = shapes[:, :, few] @ self.projector
+        return shape_prior(C, self.functions[few], self.lengths.stiffness, of_others=of_others)
+
+    @cached_property
+    def prior(self) -> ShapePrior:
+        """What its shapes in its keyframes say of other frames'."""
+        return self.prior_of(self.shapes(), of_others=False)
+
+    def bundled(self, shapes: Array, W: Array, weights: Array, prior: ShapePrior) -> Array:
         """Coefficients (F, 3, R) of shapes (F, 3, p) adjusted once to points W (F, 2, p) px with weights (F, p) px⁻²."""
         few, B = self.warps.few, self.functions
         C = shapes[:, :, few] @ self.projector
         rows = few if (weights[:, few] > 0).mean() > ENOUGH else np.arange(len(B))
         rays = rays_of(W[:, :, rows], self.camera)[:, :2]
         normal = data_normal(rays, weights[:, rows] * self.camera.focal_px**2, C, B[rows])
-        step = stepped(C, normal, self.lengths)
+        step = stepped(C, normal, self.lengths, prior)
         depth = (step[:, 2] @ B[few].T) / shapes[:, 2, few]
         good = (np.abs(np.log(np.maximum(depth, 1e-9))) < np.log(FARTHEST)).all(axis=1)  # of NaN, too, it is not
         return np.asarray(np.where(good[:, None, None], step, C))
@@ -141,13 +152,14 @@ class IsometricSheet:
         return np.asarray(np.sqrt(off**2 @ self.edge_weights / max(float(self.edge_weights.sum()), 1e-12)))
 
     def cost(self, C: Array, W: Array, weights: Array) -> Array:
-        """What bundling lowers (F,), bending apart; C (F, 3, R), W (2, p) px and weights (p,) of the frame seen in all."""
+        """What bundling lowers (F,); C (F, 3, R), W (2, p) px and weights (p,) of the frame seen in all."""
         X = C @ self.functions.T
         off = X[:, :2] / np.maximum(X[:, 2:], 1e-9) * self.camera.focal_px + self.camera.center_px[:, None] - W
         total = float(self.edge_weights.sum())
         return np.asarray(
             np.where(weights > 0, weights * (off**2).sum(axis=1), 0.0).sum(axis=1)
             + total * (self.length_change(C) / GIVE) ** 2
+            + self.prior.cost(C)
         )
 
     def moved(self, places: Array) -> "IsometricSheet":

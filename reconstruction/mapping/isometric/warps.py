@@ -8,16 +8,17 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.mapping.isometric.reference import reference_image
-from reconstruction.mapping.isometric.robust_fit import (
+from reconstruction.mapping.isometric.smooth_field import (
     FEW_FUNCTIONS,
     FINEST,
     ROUGH_SWEEPS,
+    SmoothField,
     robust_fit,
+    smooth_field,
     spread_rows,
     weighted_fit,
     weights_of,
 )
-from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
 from reconstruction.mapping.outliers import without_outliers
 
 FUNCTIONS = 100  # of the field that an image is made of

@@ -157,11 +157,12 @@ def test_what_stretches_is_no_sheet() -> None:
         sheet(W, np.ones((15, 150), bool), CAMERA)
 
 
-def test_points_beside_seen_ones_are_known() -> None:
-    W, _, found = waving()
-    x = W[0, 0]
-    known = shape_in(found, W[0], x < np.quantile(x, 0.4)).known
-    assert known[x < np.quantile(x, 0.42)].all()
+def test_what_a_frame_hides_follows_shapes_of_keyframes() -> None:
+    W, S, found = waving()
+    others = found.in_frames(np.delete(np.arange(len(W)), 7))
+    seen = W[7, 0] < np.quantile(W[7, 0], 0.6)
+    shape = shape_in(others, W[7], seen).shape
+    assert float(e3d(shape[None], S[7:8]).mean()) < 0.04
 
 
 def test_shapes_behind_the_camera_are_no_sheet() -> None:
