@@ -25,15 +25,16 @@ from reconstruction.mapping.isometric.lengths import (
 )
 from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_of, on_edges, rays_of
 from reconstruction.mapping.isometric.one_frame import DOUBTED, best_of_starts
+from reconstruction.mapping.isometric.shape_prior import FIRM, ROUGH
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
 from reconstruction.mapping.isometric.warps import Warps, smooth_warps
 
 FUNCTIONS = 40
 START_FRAMES = 10  # of the convex start
-BUNDLE_ROUNDS = 8  # of shapes, then places and lengths: with much noise they are still getting better
+BUNDLE_ROUNDS = 12  # of shapes, then places and lengths: with much noise they are still getting better
 FEW_ROUNDS = 2  # bring most of that in a tenth of a second
-ROUGH_ROUNDS = 2  # in which lengths lose their noise; after those, they go on the way they went
+ROUGH_ROUNDS = 2  # in which shapes and lengths lose their noise; after those, lengths go on the way they went
 GOING_ON = 0.7  # of the way of the round before: alone, each round goes a part of it only
 SETTLED = 2e-4  # of the shapes' size: a round that moves them less is the last
 ROUNDS = 6  # at most, of starting frames again that do not fit
@@ -126,7 +127,8 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
     W, shapes, placed = np.where(weights[:, None] > 0, W, 0.0), found.shapes(), found.warps.placed
     rays, way = rays_of(W, found.camera)[:, :2, placed], np.zeros(len(found.log_lengths))
     for k in range(rounds):
-        C = found.bundled(shapes, W, weights, found.prior_of(shapes))
+        prior = found.prior_of(shapes, FIRM if k >= ROUGH_ROUNDS else ROUGH, of_others=True)
+        C = found.bundled(shapes, W, weights, prior)
         places = found.warps.reference.copy()
         slopes = found.warps.field.slopes_at(places[:, placed])[:, : C.shape[2]]
         places[:, placed] += places_moved(C, rays, weights[:, placed], found.functions[placed], slopes)

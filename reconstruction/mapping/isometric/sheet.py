@@ -11,7 +11,7 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, stepped
 from reconstruction.mapping.isometric.lengths import Edges
 from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, on_edges, rays_of
-from reconstruction.mapping.isometric.shape_prior import ShapePrior, shape_prior
+from reconstruction.mapping.isometric.shape_prior import FIRM, ShapePrior, shape_prior
 from reconstruction.mapping.isometric.smooth_field import ENOUGH, SmoothField
 from reconstruction.mapping.isometric.warps import Warps
 
@@ -123,11 +123,11 @@ class IsometricSheet:
         """(m, R) what takes the few points of shapes to their coefficients."""
         return np.asarray(np.linalg.pinv(self.functions[self.warps.few]).T)
 
-    def prior_of(self, shapes: Array, *, of_others: bool = True) -> ShapePrior:
+    def prior_of(self, shapes: Array, firm: float = FIRM, *, of_others: bool) -> ShapePrior:
         """What shapes (F, 3, p) in its keyframes say of others, or of each other."""
         few = self.warps.few
         C = shapes[:, :, few] @ self.projector
-        return shape_prior(C, self.functions[few], self.lengths.stiffness, of_others=of_others)
+        return shape_prior(C, self.functions[few], self.lengths.stiffness, firm, of_others=of_others)
 
     @cached_property
     def prior(self) -> ShapePrior:
