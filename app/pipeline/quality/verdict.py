@@ -31,7 +31,7 @@ POOR_GUESS = 0.005
 FAIR_SHARE, POOR_SHARE = 0.5, 0.3
 # Lengths of a sheet change by less between its shapes, which hold no noise. By more, they really do (a balloon, a crease),
 # and then no rest shape is right, or bends are finer than its functions.
-MOST_STRETCH = 0.005
+MOST_STRETCH = 0.0042
 FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
