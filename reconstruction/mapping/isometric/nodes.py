@@ -40,11 +40,6 @@ class Nodes:
         """(2, n) middles of the edges in the reference image, px."""
         return np.asarray(self.reference[:, self.ends].mean(axis=2))
 
-    def nearest(self, reference: Array) -> Indices:
-        """Which node (p,) is nearest to each of the points (2, p) in the reference image; any for those without a place."""
-        apart = ((np.nan_to_num(reference)[:, :, None] - self.reference[:, None]) ** 2).sum(axis=0)
-        return np.asarray(apart.argmin(axis=1))
-
     def noise_squared(self) -> Array:
         """Change (F, n) of each edge's length by noise: squared standard deviation, over the edge's largest length."""
         i, j = self.ends.T

@@ -45,7 +45,7 @@ class ShapePrior:
 
     def at(self, C: Array) -> tuple[Array, Array]:
         """Precisions (F, 3R, 3R) about, and ways (F, 3R) from, the mean turned as shapes C (F, 3, R) are."""
-        R, F = nearest_rotation(C @ self.gram @ self.mean.T), len(C)
+        R, F = self._turns(C), len(C)
         by_axis = self.precision.reshape(*self.mean.shape, *self.mean.shape)
         turned = np.einsum("fij,fkl,jrls->firks", R, R, by_axis, optimize=True).reshape(F, self.mean.size, self.mean.size)
         if self.of_others:  # the covariance less what each gives to it: one column more of the precision
@@ -58,9 +58,12 @@ class ShapePrior:
 
     def cost(self, C: Array) -> Array:
         """Squared Mahalanobis distances (F,) of shapes C (F, 3, R) from the mean."""
-        R = nearest_rotation(C @ self.gram @ self.mean.T)
-        away = (R.swapaxes(1, 2) @ C - self.mean).reshape(len(C), -1)
+        away = (self._turns(C).swapaxes(1, 2) @ C - self.mean).reshape(len(C), -1)
         return np.asarray((away @ self.precision * away).sum(axis=1))
+
+    def _turns(self, C: Array) -> Array:
+        """Rotations (F, 3, 3) of the mean to shapes C (F, 3, R)."""
+        return nearest_rotation(C @ self.gram @ self.mean.T)
 
 
 def shape_prior(C: Array, B: Array, stiffness: Array, firm: float = FIRM, *, of_others: bool) -> ShapePrior:
