@@ -13,6 +13,7 @@ from reconstruction.basis.model import Model, build_model
 from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, medoid, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, sheet
+from reconstruction.mapping.isometric.bundle import FUNCTIONS
 from reconstruction.mapping.isometric.focal import focal, under
 from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
@@ -71,17 +72,21 @@ class Map:
         modes = min(self.modes, most) if settings.modes == "auto" else settings.modes
         return build_model(self.rest, self.camera, modes, metric, mesh, self.seen)
 
-    def foreseen(self, frames: list[tuple[Array, Mask]], last: Foreseen | None = None) -> list[Foreseen | None]:
+    def foreseen(
+        self, frames: list[tuple[Array, Mask]], last: Foreseen | None = None, *, uncertainty: bool = False
+    ) -> list[Foreseen | None]:
         """What `expected` finds in frames, one after the other, points (2, p) px, anything where not visible (p,).
 
-        None for a solid, or with too few points. `last` is what was found in the frame before.
+        None for a solid, or with too few points; standard deviations, if asked for, before a camera in perspective.
+        `last` is what was found in the frame before.
         """
         found: list[Foreseen | None] = []
+        unsure = uncertainty and self.camera.perspective
         for W, visible in frames:
             few = self.sheet is None or visible.sum() < FEWEST_POINTS
-            one = None if self.sheet is None or few else shape_in(self.sheet, np.where(visible, W, 0.0), visible, last)
-            last = one or last
-            found.append(one)
+            W = np.where(visible, W, 0.0)
+            found.append(None if self.sheet is None or few else shape_in(self.sheet, W, visible, last, uncertainty=unsure))
+            last = found[-1] or last
         return found
 
     def expected(self, model: Model, foreseen: Foreseen | None, last: State | None) -> State | None:
@@ -239,4 +244,4 @@ def sheet_map(
     # Its shapes are smooth and go by lengths: there is no noise that more modes would fit, and fewer cut off its bends.
     note = note if given is None else f"{given.note}; {note}"
     shape = RestShape("isometric" if given is None else given.kind, motion, note)
-    return Map(shape, camera, found, unit_px, MORE_MODES, evidence=evidence)
+    return Map(shape, camera, found, unit_px, FUNCTIONS if last else MORE_MODES, evidence=evidence)
