@@ -191,7 +191,7 @@ class Reconstruction:
     def foresee(self, frames: list[tuple[Array, Mask]]) -> None:
         """Begin what can be done for the next frames, points (2, p) px with visibility (p,), before they come."""
         if self.map is not None and self.deformation == "inextensible":
-            self._foresight.begin(self.map, frames, uncertainty=self.settings.uncertainty)
+            self._foresight.begin(self.map, frames)
 
     def _advance(self, most: int) -> list[ShapeEstimate]:
         """The shapes of at most so many of the frames that wait, oldest first."""
@@ -211,11 +211,9 @@ class Reconstruction:
         expected, foreseen = None, self._foresight.next()
         if self.deformation == "inextensible":
             if foreseen is None or seen is not frame:
-                unsure = self.settings.uncertainty
-                foreseen = self.map.foreseen([(seen.W, seen.visible)], self._foreseen, uncertainty=unsure)[0]
+                foreseen = self.map.foreseen([(seen.W, seen.visible)], self._foreseen)[0]
             expected = self.map.expected(self.window.model, foreseen, self.window.state)
-        sigma = None if foreseen is None or foreseen.sigma is None else self.map.unit_px * foreseen.sigma
-        self._foreseen, self._last = foreseen or self._foreseen, self.window.advance(seen.W, seen.visible, expected, sigma)
+        self._foreseen, self._last = foreseen or self._foreseen, self.window.advance(seen.W, seen.visible, expected)
         if seen is frame:
             return self._last
         return replace(self._last, visible=frame.visible, residual_px=np.full_like(self._last.residual_px, np.nan))
@@ -229,7 +227,8 @@ class Reconstruction:
             found = found.scaled(ratio_of_sizes(before.model.basis.rest, found.rest.motion.shape))
             if last is not None and not found.camera.perspective:
                 found = found.turned_like(last.shape)
-        model = (None if self._mesh else found.model) or found.modelled(self.settings, self._mesh)
+        model = None if self._mesh else found.model
+        model = model or found.modelled(self.settings, self._mesh)
         self.map, self.camera, self._foreseen = replace(found, model=None), found.camera, None
         self.deformation = constraints.fitting(self.settings.deformation, flat=found.is_sheet)
         self.metric = distances.fitting(self.settings.metric, flat=found.is_sheet)

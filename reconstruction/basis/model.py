@@ -18,7 +18,7 @@ from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
 from reconstruction.state import State
 
-COARSE_VERTICES = 60
+COARSE_VERTICES, VERTICES_PER_MODE = 60, 1.6  # at least so many: more modes stretch between fewer
 TURNS = 3  # of pose and Λ, each with the other known
 STAYS = 0.02  # pull of Λ to the frame before, against 1 of a mode that shows in all points
 
@@ -124,9 +124,10 @@ class Model:
         t = s * origin[:2, 0] + self.normalised(camera.center_px[:, None])[:, 0]
         return State(quaternion_from_rotation(R)[None], t[None], np.log([s]), Lambda[None])
 
-    def coarse_edges(self, vertices: int = COARSE_VERTICES) -> CoarseEdges:
-        """Edges of a coarse mesh through well-spread points, triangulated in the main plane."""
+    def coarse_edges(self, vertices: int | None = None) -> CoarseEdges:
+        """Edges of a coarse mesh through well-spread points, triangulated in the main plane; finer for more modes."""
         rest, modes = self.B[:3], self.B[3:-1]
+        vertices = vertices or max(COARSE_VERTICES, round(VERTICES_PER_MODE * len(modes)))
         chosen = farthest_points(rest.T, vertices)
         edges = chosen[unique_edges(triangulate(rest[:2, chosen].T).faces)]
         start, end = edges.T

@@ -2,7 +2,6 @@
 
 from collections import deque
 from concurrent.futures import Future
-from functools import partial
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.mapping.isometric.one_frame import Foreseen
@@ -22,10 +21,10 @@ class Foresight:
         self._begun = deque["Future[list[Foreseen | None]]"]()
         self._made = deque[Foreseen | None]()
 
-    def begin(self, known: Map, frames: list[tuple[Array, Mask]], *, uncertainty: bool = False) -> None:
+    def begin(self, known: Map, frames: list[tuple[Array, Mask]]) -> None:
         """Begin with the next frames, points (2, p) px with visibility (p,), by what is known of the object."""
         if known.sheet is not None:
-            self._begun.append(self._start(partial(known.foreseen, uncertainty=uncertainty), frames))
+            self._begun.append(self._start(known.foreseen, frames))
 
     def next(self) -> Foreseen | None:
         """Of the next frame, if it was begun."""

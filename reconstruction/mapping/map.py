@@ -72,21 +72,17 @@ class Map:
         modes = min(self.modes, most) if settings.modes == "auto" else settings.modes
         return build_model(self.rest, self.camera, modes, metric, mesh, self.seen)
 
-    def foreseen(
-        self, frames: list[tuple[Array, Mask]], last: Foreseen | None = None, *, uncertainty: bool = False
-    ) -> list[Foreseen | None]:
+    def foreseen(self, frames: list[tuple[Array, Mask]], last: Foreseen | None = None) -> list[Foreseen | None]:
         """What `expected` finds in frames, one after the other, points (2, p) px, anything where not visible (p,).
 
-        None for a solid, or with too few points; standard deviations, if asked for, before a camera in perspective.
-        `last` is what was found in the frame before.
+        None for a solid, or with too few points. `last` is what was found in the frame before.
         """
         found: list[Foreseen | None] = []
-        unsure = uncertainty and self.camera.perspective
         for W, visible in frames:
             few = self.sheet is None or visible.sum() < FEWEST_POINTS
-            W = np.where(visible, W, 0.0)
-            found.append(None if self.sheet is None or few else shape_in(self.sheet, W, visible, last, uncertainty=unsure))
-            last = found[-1] or last
+            one = None if self.sheet is None or few else shape_in(self.sheet, np.where(visible, W, 0.0), visible, last)
+            last = one or last
+            found.append(one)
         return found
 
     def expected(self, model: Model, foreseen: Foreseen | None, last: State | None) -> State | None:

@@ -81,17 +81,16 @@ class SlidingWindow:
         self._switch: Switch | None = None  # of the newest frame
         self._uncertainty = Uncertainty(model) if uncertainty else None
 
-    def advance(self, W: Array, visible: Mask, expected: State | None = None, sigma: Array | None = None) -> ShapeEstimate:
+    def advance(self, W: Array, visible: Mask, expected: State | None = None) -> ShapeEstimate:
         """Add the next frame's points (2, p) px and adjust the window; returns the newest frame's shape.
 
         Args:
             W: (2, p) px; anything where not visible.
             visible: (p,).
             expected: its pose and Λ' by other knowledge (n = 1): where it starts, and what it is pulled to.
-            sigma: (p,) standard deviations of what is expected, in units of the rest shape, if they are asked for.
         """
         if expected is not None:
-            return self._near(W, visible, expected, sigma)
+            return self._near(W, visible, expected)
         self.frames += 1
         self._switch = None
         if self.state is not None and len(self.state) > len(self._data):  # begun by the model before, which saw that frame
@@ -115,17 +114,18 @@ class SlidingWindow:
             self._weigh_rest(self.state[-1:])
         return replace(self._estimate(W, visible, self._as_shown(self.state)), switch=self._switch)
 
-    def _near(self, W: Array, visible: Mask, expected: State, sigma: Array | None) -> ShapeEstimate:
+    def _near(self, W: Array, visible: Mask, expected: State) -> ShapeEstimate:
         """The next frame by itself, near to what is expected."""
         self.frames += 1
-        weights = robust_weights(self.model.residuals(W, expected) / self.model.radius_px, visible)
-        data = image_statistics(self.model, W, weights)
+        data = image_statistics(
+            self.model, W, robust_weights(self.model.residuals(W, expected) / self.model.radius_px, visible)
+        )
         energy = Energy(rest=EXPECTED, centre=expected.Lambda[0], rows=self._energy.rows, tied=False)
         found = one_step(energy, data, expected)
         # The frame before stays for the prediction.
         self.state = found if self.state is None else join([self.state[-1:], found])
         self._data, self._before = [*self._data[-1:], data], None
-        return self._estimate(W, visible, found, sigma)
+        return self._estimate(W, visible, found)
 
     def restart(self) -> None:
         """The surface was lost: the next frame is tied to nothing, and starts from the rest or from the last shape."""
@@ -224,11 +224,9 @@ class SlidingWindow:
         """The frames with the newest adjusted by the energy that follows the guide, if there is one."""
         return with_newest(state, self._newest(state, self._shown, SHOW).state) if self._shown else state
 
-    def _estimate(self, W: Array, visible: Mask, state: State, sigma: Array | None = None) -> ShapeEstimate:
-        """The newest frame of a state in units of shape and image, standard deviations (p,) given or by the energy."""
+    def _estimate(self, W: Array, visible: Mask, state: State) -> ShapeEstimate:
+        """The newest frame of a state in units of shape and image."""
         estimate = self.model.estimate(self.frames - 1, W, visible, state)
-        if sigma is not None:
-            return replace(estimate, sigma=sigma)
         if self._uncertainty is None:
             return estimate
         energy = self._shown or self._energy

@@ -4,7 +4,6 @@ Smooth images and depths along their rays, found one after the other, are only t
 does not know that the sheet keeps its lengths. A shape is S = C B, B smooth functions of the place on the reference image.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +12,9 @@ from scipy.linalg.lapack import dposv
 
 from reconstruction.arrays import Array
 from reconstruction.mapping.isometric.shape_prior import ShapePrior
-from reconstruction.window.uncertainty.variances import variance
 
 FUNCTIONS = 60
 GIVE = 0.002  # of lengths: what they change by, noise apart
-LAST = 0.3  # of the functions, that tell what those left out are like
 
 
 @dataclass(frozen=True)
@@ -74,63 +71,21 @@ def stepped(C: Array, data: Array, lengths: Lengths, prior: ShapePrior) -> Array
 
     NaN where there is no such step.
     """
+    F, _, R = C.shape
+    logs, slopes = lengths.now(C)
+    root = np.sqrt(lengths.weights) / GIVE
+    halves = [np.ascontiguousarray(half.T) for half in lengths.halves]
     held, away = prior.at(C)
-    step = np.empty((len(C), held.shape[1]))
-    for f, (J, off) in enumerate(changes(C, lengths)):
-        gradient = data[f] @ C[f].ravel() + J @ off + held[f] @ away[f]
+    step = np.empty((F, 3 * R))
+    for f, along in enumerate((slopes * root).swapaxes(0, 1)):
+        J = (along[0][:, None] * halves[0] + along[1][:, None] * halves[1]).reshape(3 * R, -1)
+        gradient = data[f] @ C[f].ravel() + J @ (root * (logs[f] - lengths.logs)) + held[f] @ away[f]
         # One triangle of the symmetric matrix is enough for Cholesky's factors. LAPACK counts along columns.
         normal = dsyrk(1.0, J.T, 1.0, data[f].T + held[f], trans=1)
         _, step[f], failed = dposv(normal, gradient, overwrite_a=1, overwrite_b=1)
         if failed:
             step[f] = np.nan
     return C - step.reshape(C.shape)
-
-
-def changes(C: Array, lengths: Lengths) -> Iterator[tuple[Array, Array]]:
-    """Of each of shapes C (F, 3, R): slopes (3R, n) of the edges' changes of length (n,), both over what they give."""
-    logs, slopes = lengths.now(C)
-    root = np.sqrt(lengths.weights) / GIVE
-    halves = [np.ascontiguousarray(half.T) for half in lengths.halves]
-    for one, along in zip(logs, (slopes * root).swapaxes(0, 1), strict=True):
-        J = along[0][:, None] * halves[0] + along[1][:, None] * halves[1]
-        yield J.reshape(-1, len(root)), root * (one - lengths.logs)
-
-
-def deviations(C: Array, rays: Array, weights: Array, B: Array, lengths: Lengths, prior: ShapePrior) -> Array:
-    """Standard deviations (p,) of a shape C B, C (3, R), from its true place, a shift and a turn of the whole apart.
-
-    What images and lengths leave over, after what the shape takes up, tells how noisy each is (Förstner's variance
-    components), never less than assumed; the normal matrix how far that moves the shape. What is left over in the image
-    beyond noise is missing in the shape, too, and in depth as much more as the last functions are larger there.
-
-    Args:
-        C: as above.
-        rays: (2, p), third coordinate 1.
-        weights: (p,) of squared errors in the image; 0 where not seen.
-        B: (p, R) the functions at all points.
-        lengths: the edges'.
-        prior: what keyframes say.
-    """
-    X, data = C @ B.T, data_normal(rays[None], weights[None], C[None], B)[0]
-    J, change = next(changes(C[None], lengths))
-    edges, held = J @ J.T, prior.at(C[None])[0][0]
-    inverse = np.linalg.inv(data + edges + held)
-    off = np.where(weights > 0, np.sqrt(weights) * (X[:2] / X[2] - rays), 0.0)
-    seen, kept = 2 * float((weights > 0).sum()), float(lengths.weights.sum())
-    tau = [
-        max(variance(float((left**2).sum()), count, float((inverse * part).sum())), 1.0)
-        for left, count, part in ((off, seen, data), (change, kept, edges))
-    ]
-    spread, axes = np.linalg.eigh(inverse @ (tau[0] * data + tau[1] * edges + held) @ inverse)
-    moved = (B - B.mean(axis=0)) @ (axes * np.sqrt(spread.clip(0.0))).reshape(*C.shape, -1)  # (3, p, 3R)
-    centred = X - X.mean(axis=1, keepdims=True)
-    turns = np.linalg.qr(np.cross(np.eye(3)[:, None], centred.T[None]).transpose(2, 1, 0).reshape(-1, 3))[0]
-    flat = moved.reshape(len(turns), -1)
-    flat -= turns @ (turns.T @ flat)
-    last = (C[:, -max(1, round(LAST * C.shape[1])) :] ** 2).sum(axis=1)
-    usual = float(np.median(weights[weights > 0])) if seen else np.inf
-    missing = (tau[0] - 1) / usual * float((X[2] ** 2).mean()) * last.sum() / max(float(last[:2].mean()), 1e-300)
-    return np.asarray(np.sqrt((flat.reshape(moved.shape) ** 2).sum(axis=(0, 2)) + missing))
 
 
 def places_moved(C: Array, rays: Array, weights: Array, B: Array, slopes: Array) -> Array:

@@ -31,17 +31,13 @@ class Foreseen:
     Attributes:
         shape: (3, p) in camera axes; NaN for points that no keyframe shows.
         usual: change of lengths up to this frame, later ones counting more.
-        sigma: (p,) standard deviations of the points; None unless asked for.
     """
 
     shape: Array
     usual: float
-    sigma: Array | None = None
 
 
-def shape_in(
-    sheet: IsometricSheet, W: Array, visible: Mask, last: Foreseen | None = None, *, uncertainty: bool = False
-) -> Foreseen:
+def shape_in(sheet: IsometricSheet, W: Array, visible: Mask, last: Foreseen | None = None) -> Foreseen:
     """The shape in one more frame W (2, p) px, visible (p,), its lengths known.
 
     Args:
@@ -49,7 +45,6 @@ def shape_in(
         W: as above; finite.
         visible: as above.
         last: the shape in the frame before: a start beside the depths of the keyframe that looks most alike.
-        uncertainty: whether standard deviations are asked for.
     """
     points = sheet.nodes.points
     coefficients, variance, weights = quick_fit(sheet.warps, W, visible, points)
@@ -68,7 +63,6 @@ def shape_in(
     return Foreseen(
         np.where(sheet.warps.placed, C[0] @ sheet.functions.T, np.nan),
         (1 - RENEWED) * usual + RENEWED * float(change),
-        sheet.deviations(C[0], W, weights) if uncertainty else None,
     )
 
 

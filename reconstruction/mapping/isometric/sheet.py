@@ -8,7 +8,7 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices
 from reconstruction.camera import Camera
-from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, deviations, stepped
+from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, stepped
 from reconstruction.mapping.isometric.lengths import Edges
 from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, on_edges, rays_of
 from reconstruction.mapping.isometric.shape_prior import FIRM, ShapePrior, shape_prior
@@ -161,18 +161,6 @@ class IsometricSheet:
             + total * (self.length_change(C) / GIVE) ** 2
             + self.prior.cost(C)
         )
-
-    def deviations(self, C: Array, W: Array, weights: Array) -> Array:
-        """Standard deviations (p,) of a shape C (3, R) in a frame W (2, p) px, weights (p,) px⁻².
-
-        Points that no keyframe shows have the largest of the others'.
-        """
-        placed, rays = self.warps.placed, rays_of(W[None], self.camera)[0, :2]
-        weights = weights[placed] * self.camera.focal_px**2
-        of_placed = deviations(C, rays[:, placed], weights, self.functions[placed], self.lengths, self.prior)
-        sigma = np.full(len(placed), of_placed.max())
-        sigma[placed] = of_placed
-        return sigma
 
     def moved(self, places: Array) -> "IsometricSheet":
         """The same with points at other places (2, p) of the reference image."""
