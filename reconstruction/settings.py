@@ -36,7 +36,7 @@ class Settings:
     solid rest shape, chi-squared for a flat one."""
     modes: Literal["auto"] | int = "auto"
     """Number of modes r. Auto: 20; 40 or 80 for a solid whose keyframes show that it deforms, 40 for a sheet
-    that they have found, 60 for one that all of them have."""
+    that they have found, 60 in the final pass."""
     deformation: Deformation = "auto"
     """How the surface may deform: bend out of its plane, drawing in as a sheet does; in its plane; freely; freely, but
     nearly keeping its lengths. Auto: general for a solid rest shape, inextensible for a flat one."""

@@ -18,7 +18,8 @@ from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
 from reconstruction.state import State
 
-COARSE_VERTICES, VERTICES_PER_MODE = 60, 1.6  # at least so many: more modes stretch between fewer
+COARSE_VERTICES = 60  # at least so many,
+VERTICES_PER_MODE = 1.6  # and so many for each mode: between fewer, modes stretch
 TURNS = 3  # of pose and Λ, each with the other known
 STAYS = 0.02  # pull of Λ to the frame before, against 1 of a mode that shows in all points
 

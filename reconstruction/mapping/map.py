@@ -237,7 +237,8 @@ def sheet_map(
     t = (s * unit_px)[:, None] * origin[:, :2] + found.camera.center_px - camera.center_px
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, t)
     note = f"sheet from {len(shapes)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
-    # Its shapes are smooth and go by lengths: there is no noise that more modes would fit, and fewer cut off its bends.
+    # Its shapes are smooth and go by lengths: there is no noise that more modes would fit, and fewer than its functions
+    # cut off its bends; on the way they are faster.
     note = note if given is None else f"{given.note}; {note}"
     shape = RestShape("isometric" if given is None else given.kind, motion, note)
     return Map(shape, camera, found, unit_px, FUNCTIONS if last else MORE_MODES, evidence=evidence)
