@@ -4,15 +4,17 @@ Points are eliminated (Schur complement): a step is one matrix product over the 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from reconstruction.arrays import Array
-from reconstruction.mapping.solid.bundle import POSE, Bundle, Loss, Prior, derivatives, off_plane
+from reconstruction.mapping.solid.bundle import POSE, Bundle, Derivatives, Loss, Prior, off_plane
+from reconstruction.mapping.solid.factors import Factors
 
 NEAREST = 0.1  # a point's depth over its view's, closer than which no point may come to the camera
 GIVING_UP = 1e6  # damping at which no step helps any more
-FIXED = (0, 1, 2, 5)  # of the first view: its turn and scale are the shape's axes and unit
+FIXED = [0, 1, 2, 5]  # of the first view: its turn and scale are the shape's axes and unit
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ def adjust(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior, how: Ad
     """
     damping, value = 1e-3, energy(W, h, bundle, loss, prior)
     for _ in range(how.steps):
-        system = linearise(W, h, bundle, loss, prior)
+        system = System(W, h, bundle, loss, prior)
         while damping < GIVING_UP:
             tried = bundle.moved(*system.step_of(how, damping))
             after = energy(W, h, tried, loss, prior)
@@ -72,20 +74,16 @@ def energy(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior) -> floa
 
 @dataclass(frozen=True)
 class System:
-    """Normal equations, arrow-shaped: views and focal length against points.
+    """Gauss-Newton's normal equations of `energy`, the loss by its weights, the prior's plane held: views against points.
 
-    Attributes:
-        views: (6K + 1, 6K + 1) of poses and log κ.
-        between: (p, 6K + 1, 3).
-        points: (p, 3, 3).
-        right_views, right_points: (6K + 1,), (p, 3): minus the gradient.
+    What a step does not need is not worked out. Its attributes are the arguments of `adjust`.
     """
 
-    views: Array
-    between: Array
-    points: Array
-    right_views: Array
-    right_points: Array
+    W: Array
+    h: Array
+    bundle: Bundle
+    loss: Loss
+    prior: Prior
 
     def step_of(self, how: Adjustment, damping: float) -> tuple[Array, float, Array]:
         """Poses (K, 6), log κ, points (3, p), of what may change."""
@@ -95,72 +93,122 @@ class System:
 
     def step(self, damping: float) -> tuple[Array, float, Array]:
         """All at once."""
-        points = damped(self.points, damping)
-        inverse = np.linalg.inv(points)
-        carried = self.between @ inverse  # (p, n, 3)
-        n = len(self.right_views)
-        flat = [x.transpose(1, 0, 2).reshape(n, -1) for x in (carried, self.between)]
-        schur = damped(self.views, damping) - flat[0] @ flat[1].T
-        d = np.linalg.solve(schur, self.right_views - flat[0] @ self.right_points.ravel())
-        back = self.right_points - (flat[1].T @ d).reshape(-1, 3)
-        return np.asarray(d[:-1].reshape(-1, POSE)), float(d[-1]), np.asarray((inverse @ back[:, :, None])[:, :, 0].T)
+        factors = Factors.of(damped(self.points, damping))
+        between = factors.whitened(self.between).reshape(len(self.right_views), -1)
+        right = factors.whitened(self.right_points)
+        schur = damped(self.views, damping) - between @ between.T
+        d = np.linalg.solve(schur, self.right_views - between @ right.ravel())
+        points = factors.back(right - (between.T @ d).reshape(right.shape))
+        return np.asarray(d[:-1].reshape(-1, POSE)), float(d[-1]), points
 
     def pose_step(self, damping: float) -> tuple[Array, float, Array]:
         """With shape and focal length held."""
-        n = len(self.right_views) - 1
-        d = np.linalg.solve(damped(self.views[:n, :n], damping), self.right_views[:n])
-        return np.asarray(d.reshape(-1, POSE)), 0.0, np.zeros((3, len(self.right_points)))
+        d = np.linalg.solve(damped(self.views[:-1, :-1], damping), self.right_views[:-1])
+        return np.asarray(d.reshape(-1, POSE)), 0.0, np.zeros_like(self.bundle.motion.shape)
 
     def point_step(self, damping: float) -> tuple[Array, float, Array]:
         """With poses and focal length held."""
-        d = np.linalg.solve(damped(self.points, damping), self.right_points[:, :, None])
-        return np.zeros((len(self.right_views) // POSE, POSE)), 0.0, np.asarray(d[:, :, 0].T)
+        factors = Factors.of(damped(self.points, damping))
+        return np.zeros((len(self.W), POSE)), 0.0, factors.back(factors.whitened(self.right_points))
+
+    @cached_property
+    def views(self) -> Array:
+        """(6K + 1, 6K + 1) of poses and log κ."""
+        n = POSE * len(self.W)
+        views = np.zeros((n + 1, n + 1))
+        k = np.arange(len(self.W))
+        weighted, A = self._weighted_pose.reshape(len(k), POSE, -1), self._pose.reshape(len(k), POSE, -1)
+        views[:n, :n].reshape(len(k), POSE, len(k), POSE)[k, :, k] = weighted @ A.transpose(0, 2, 1)
+        views[FIXED, FIXED] = views[-1, -1] = 1.0
+        if not self._held:
+            b, longer = self.derivatives.by_log_kappa, self.plane[2]
+            views[-1, :-1] = views[:-1, -1] = (weighted @ b.reshape(len(k), -1, 1)).ravel()
+            views[-1, -1] = (
+                (self.weights * (b * b).sum(axis=1)).sum() + self.prior.focal + self.prior.depth * longer @ longer
+            )
+        return views
+
+    @cached_property
+    def between(self) -> Array:
+        """(6K + 1, 3, p)."""
+        (K, _, p), B = self.W.shape, self.derivatives.by_point
+        between = np.zeros((POSE * K + 1, 3, p))
+        blocks, A = between[:-1].reshape(K, POSE, 3, p), self._weighted_pose
+        np.multiply(A[:, :, None, 0], B[:, None, :, 0], out=blocks)
+        blocks += A[:, :, None, 1] * B[:, None, :, 1]
+        if not self._held:
+            _, slope, longer = self.plane
+            b = self.weights[:, None] * self.derivatives.by_log_kappa
+            between[-1] = np.einsum("kcp,kdcp->dp", b, B) + self.prior.depth * longer * slope
+        return between
+
+    @cached_property
+    def points(self) -> Array:
+        """(3, 3, p)."""
+        B, slope = self.derivatives.by_point, self.plane[1]
+        points = np.einsum("kdcp,kecp->dep", self.weights[:, None, None] * B, B)
+        return np.asarray(points + self.prior.depth * slope[:, None] * slope)
+
+    @cached_property
+    def right_views(self) -> Array:
+        """(6K + 1,) minus the gradient."""
+        right = np.zeros(POSE * len(self.W) + 1)
+        right[:-1] = -(self._pose * self._weighted[:, None]).sum(axis=(2, 3)).ravel()
+        if not self._held:
+            off, _, longer = self.plane
+            right[-1] = -(self.derivatives.by_log_kappa * self._weighted).sum() - self.prior.depth * longer @ off
+            right[-1] -= self.prior.focal * np.log(self.bundle.kappa / self.prior.kappa)
+        return right
+
+    @cached_property
+    def right_points(self) -> Array:
+        """(3, p) minus the gradient."""
+        off, slope, _ = self.plane
+        return -np.einsum("kdcp,kcp->dp", self.derivatives.by_point, self._weighted) - self.prior.depth * off * slope
+
+    @cached_property
+    def derivatives(self) -> Derivatives:
+        """Of the images."""
+        return Derivatives(self.bundle)
+
+    @cached_property
+    def plane(self) -> tuple[Array, Array, Array]:
+        """What `off_plane` finds."""
+        return off_plane(self.bundle.motion.shape, self.bundle.kappa)
+
+    @cached_property
+    def off(self) -> Array:
+        """Residuals u − W (K, 2, p)."""
+        return np.asarray(self.derivatives.image - self.W)
+
+    @cached_property
+    def weights(self) -> Array:
+        """(K, p) of the residuals."""
+        return np.asarray(self.h * self.loss.weight((self.off**2).sum(axis=1)))
+
+    @cached_property
+    def _weighted(self) -> Array:
+        return np.asarray(self.weights[:, None] * self.off)
+
+    @cached_property
+    def _pose(self) -> Array:
+        A = self.derivatives.by_pose
+        A[0, FIXED] = 0.0
+        return A
+
+    @cached_property
+    def _weighted_pose(self) -> Array:
+        return np.asarray(self._pose * self.weights[:, None, None])
+
+    @property
+    def _held(self) -> bool:
+        return bool(np.isinf(self.prior.focal)) or self.bundle.kappa == 0
 
 
 def damped(matrix: Array, damping: float) -> Array:
-    """Matrices (..., n, n) with their diagonal enlarged."""
-    diagonal = np.diagonal(matrix, axis1=-2, axis2=-1)
-    least = 1e-12 * diagonal.max(initial=1e-300)
-    return np.asarray(matrix + (damping * diagonal + least)[..., None] * np.eye(matrix.shape[-1]))
-
-
-def linearise(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior) -> System:
-    """Gauss-Newton's normal equations of `energy`, the loss by its weights, the prior's plane held."""
-    K, _, p = W.shape
-    motion = bundle.motion
-    A, b, B, e = derivatives(W, bundle)
-    w = h * loss.weight((e**2).sum(axis=1))
-    Aw = A * w[:, None, None]
-    flat = A.reshape(K, POSE, 2 * p)
-    views = np.zeros((POSE * K + 1, POSE * K + 1))
-    blocks = views[:-1, :-1].reshape(K, POSE, K, POSE)
-    k = np.arange(K)
-    blocks[k, :, k] = Aw.reshape(K, POSE, 2 * p) @ flat.transpose(0, 2, 1)
-    weighted = w[:, None] * e
-    right = np.empty(POSE * K + 1)
-    right[:-1] = -(flat @ weighted.reshape(K, 2 * p, 1)).ravel()
-    held = np.isinf(prior.focal) or bundle.kappa == 0
-    if held:
-        b, views[-1, -1] = np.zeros_like(b), 1.0
-    views[-1, :-1] = (Aw.reshape(K, POSE, 2 * p) @ b.reshape(K, 2 * p, 1)).ravel()
-    views[:-1, -1] = views[-1, :-1]
-    right[-1] = -(b * weighted).sum()
-    if not held:
-        views[-1, -1] += (w[:, None] * b * b).sum() + prior.focal
-        right[-1] -= prior.focal * np.log(bundle.kappa / prior.kappa)
-    between = np.empty((p, POSE * K + 1, 3))
-    between[:, :-1] = np.einsum("kacp,kdcp->pkad", Aw, B).reshape(p, POSE * K, 3)
-    between[:, -1] = np.einsum("kcp,kdcp->pd", w[:, None] * b, B)
-    points = np.einsum("kdcp,kecp->pde", w[:, None, None] * B, B)
-    right_points = -np.einsum("kdcp,kcp->pd", B, weighted)
-    off, slope, longer = off_plane(motion.shape, bundle.kappa)
-    points += prior.depth * slope[:, :, None] * slope[:, None]
-    right_points -= prior.depth * off[:, None] * slope
-    if not held:
-        views[-1, -1] += prior.depth * longer @ longer
-        right[-1] -= prior.depth * longer @ off
-        between[:, -1] += prior.depth * longer[:, None] * slope
-    for fixed in FIXED:
-        views[fixed], views[:, fixed], right[fixed], between[:, fixed] = 0.0, 0.0, 0.0, 0.0
-        views[fixed, fixed] = 1.0
-    return System(views, between, points, right, right_points)
+    """A matrix (n, n, ...), or many, with the diagonal enlarged."""
+    k = np.arange(len(matrix))
+    diagonal = matrix[k, k]
+    matrix = matrix.copy()
+    matrix[k, k] = (1 + damping) * diagonal + 1e-12 * diagonal.max(initial=1e-300)
+    return matrix

@@ -9,6 +9,7 @@ Derivatives: ∂u/∂Y = [1, 0, −κu_x; 0, 1, −κu_y]/d, ∂u/∂t = 1/d, �
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -120,16 +121,16 @@ class Prior:
 
 
 def off_plane(shape: Array, kappa: float) -> tuple[Array, Array, Array]:
-    """d/(1 + κ z) (p,) of a shape (3, p), see `Prior`; its derivatives (p, 3) by each point, plane held, and (p,) by log κ.
+    """d/(1 + κ z) (p,) of a shape (3, p), see `Prior`; its derivatives (3, p) by each point, plane held, and (p,) by log κ.
 
     Not along the plane's normal: a shape could lean over to come nearer to it.
     """
     nearness = 1 / (1 + kappa * shape[2])
     plane = nearness * np.concatenate([shape[:2], np.ones((1, shape.shape[1])), shape[2:]])
-    a, b, c = np.linalg.lstsq(plane[:3].T, plane[3], rcond=None)[0]
+    a, b, c = np.linalg.solve(plane[:3] @ plane[:3].T, plane[:3] @ plane[3])
     off = plane[3] - a * plane[0] - b * plane[1] - c * plane[2]
-    slope = nearness[:, None] * np.array([-a, -b, 1.0])
-    slope[:, 2] -= kappa * nearness * off
+    slope = nearness * np.array([[-a], [-b], [1.0]])
+    slope[2] -= kappa * nearness * off
     return np.asarray(off), slope, np.asarray(-kappa * shape[2] * nearness * off)
 
 
@@ -143,24 +144,56 @@ def prior_of(bundle: Bundle, h: Array, sigma: float, kappa: float, *, refine: bo
     return Prior(depth, focal, kappa)
 
 
-def derivatives(W: Array, bundle: Bundle) -> tuple[Array, Array, Array, Array]:
-    """∂u/∂pose (K, 6, 2, p), ∂u/∂log κ (K, 2, p), ∂u/∂X (K, 3, 2, p), and the residuals u − W (K, 2, p)."""
-    K, _, p = W.shape
-    m, kappa = bundle.motion, bundle.kappa
-    Y = bundle.placed()
-    inverse = 1 / (1 + kappa * Y[:, 2])
-    u = bundle.image(Y)
-    slope = -kappa * u  # ∂u/∂Y_z times d
-    A = np.zeros((K, POSE, 2, p))
-    A[:, 0, 0], A[:, 0, 1] = slope[:, 0] * Y[:, 1], -Y[:, 2] + slope[:, 1] * Y[:, 1]
-    A[:, 1, 0], A[:, 1, 1] = Y[:, 2] - slope[:, 0] * Y[:, 0], -slope[:, 1] * Y[:, 0]
-    A[:, 2, 0], A[:, 2, 1] = -Y[:, 1], Y[:, 0]
-    A[:, 3, 0] = A[:, 4, 1] = 1.0
-    A[:, 5] = Y[:, :2] + slope * Y[:, 2:]
-    A *= inverse[:, None, None]
-    turned = (m.s[:, None, None] * m.R).transpose(0, 2, 1)  # (K, 3 of X, 3 of Y)
-    B = turned[:, :, :2, None] + turned[:, :, 2:, None] * slope[:, None]
-    return A, slope * Y[:, 2:] * inverse[:, None], B * inverse[:, None, None], u - W
+@dataclass(frozen=True)
+class Derivatives:
+    """Of the images, where a bundle is; each worked out when it is asked for."""
+
+    bundle: Bundle
+
+    @cached_property
+    def image(self) -> Array:
+        """Points u (K, 2, p)."""
+        return self.bundle.image(self._placed)
+
+    @cached_property
+    def by_pose(self) -> Array:
+        """∂u/∂(θ, t, log s) (K, 6, 2, p)."""
+        Y, slope = self._placed, self._slope
+        A = np.zeros((len(Y), POSE, 2, Y.shape[2]))
+        A[:, 0, 0], A[:, 0, 1] = slope[:, 0] * Y[:, 1], -Y[:, 2] + slope[:, 1] * Y[:, 1]
+        A[:, 1, 0], A[:, 1, 1] = Y[:, 2] - slope[:, 0] * Y[:, 0], -slope[:, 1] * Y[:, 0]
+        A[:, 2, 0], A[:, 2, 1] = -Y[:, 1], Y[:, 0]
+        A[:, 3, 0] = A[:, 4, 1] = 1.0
+        A[:, 5] = Y[:, :2] + slope * Y[:, 2:]
+        A *= self._nearness[:, None, None]
+        return A
+
+    @cached_property
+    def by_log_kappa(self) -> Array:
+        """∂u/∂log κ (K, 2, p)."""
+        return np.asarray(self._slope * self._placed[:, 2:] * self._nearness[:, None])
+
+    @cached_property
+    def by_point(self) -> Array:
+        """∂u/∂X (K, 3, 2, p)."""
+        m = self.bundle.motion
+        turned = (m.s[:, None, None] * m.R).transpose(0, 2, 1)  # (K, 3 of X, 3 of Y)
+        B = turned[:, :, :2, None] + turned[:, :, 2:, None] * self._slope[:, None]
+        B *= self._nearness[:, None, None]
+        return np.asarray(B)
+
+    @cached_property
+    def _placed(self) -> Array:
+        return self.bundle.placed()
+
+    @cached_property
+    def _nearness(self) -> Array:
+        return np.asarray(1 / (1 + self.bundle.kappa * self._placed[:, 2]))
+
+    @cached_property
+    def _slope(self) -> Array:
+        """∂u/∂Y_z times d."""
+        return np.asarray(-self.bundle.kappa * self.image)
 
 
 def scaled(bundle: Bundle, factor: float) -> Bundle:

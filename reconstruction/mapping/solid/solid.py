@@ -229,7 +229,7 @@ def describe(W: Array, visible: Mask, bundle: Bundle, camera: Camera, bulges: tu
     """The solid of a bundle in pixels, its spikes smoothed; W and bundle relative to the principal point."""
     residual = np.where(visible, np.linalg.norm(bundle.image() - W, axis=1), np.nan)
     focal = 1 / bundle.kappa if bundle.kappa else np.inf
-    motion, trusted = smoothed(W, visible, bundle, residual)
+    motion, trusted = smoothed(visible, bundle, residual)
     turn = view_turn_degrees(motion.R)
     depth = relief(motion.shape)
     note = f"solid from {len(W)} keyframes, turned {turn:.0f}°, median residual {np.nanmedian(residual):.2f} px"

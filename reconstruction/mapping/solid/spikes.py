@@ -15,7 +15,7 @@ from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.rest_shape import RigidMotion
-from reconstruction.mapping.solid.bundle import Bundle, derivatives
+from reconstruction.mapping.solid.bundle import Bundle, Derivatives
 from reconstruction.window.robust import RAYLEIGH_MEDIAN, deviation
 
 INLIER_SIGMAS = 3.0  # of the residuals
@@ -33,11 +33,10 @@ PROVEN = 20.0  # standard deviations of its depth that it may, too: a nose of fe
 SMOOTHEST = 0.1  # times half the width: no surface is believed to be smoother, or creases would be rounded
 
 
-def smoothed(W: Array, visible: Mask, bundle: Bundle, residual: Array) -> tuple[RigidMotion, Mask]:
+def smoothed(visible: Mask, bundle: Bundle, residual: Array) -> tuple[RigidMotion, Mask]:
     """The motion with spikes smoothed, and which points (p,) keep the depth that the views gave them.
 
     Args:
-        W: (K, 2, p) relative to the principal point.
         visible: (K, p).
         bundle: in the first view's axes.
         residual: (K, p) lengths, NaN where not visible.
@@ -50,7 +49,7 @@ def smoothed(W: Array, visible: Mask, bundle: Bundle, residual: Array) -> tuple[
     agrees = visible & (np.nan_to_num(residual, nan=np.inf) < INLIER_SIGMAS * 1.2 * usual.clip(sigma, LIVELY * sigma))
     count = agrees.sum(axis=0)
     sound = (count >= FEWEST) & (count >= SHARE * visible.sum(axis=0))
-    information = axes.T @ point_information(W, agrees.astype(np.float64), bundle) @ axes
+    information = axes.T @ point_information(agrees.astype(np.float64), bundle) @ axes
     own = np.sqrt((np.where(agrees, residual, 0.0) ** 2).sum(axis=0) / count.clip(1) / 2)
     noise = np.sqrt((own**2 + sigma**2) / 2)
     spread = np.minimum(depth_variance(information) * noise**2 * LIKE_VIEWS, deep**2)
@@ -80,9 +79,9 @@ def solved(A: sp.csc_array, b: Array) -> Array:
     return np.asarray(splu(A, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(b))
 
 
-def point_information(W: Array, h: Array, bundle: Bundle) -> Array:
+def point_information(h: Array, bundle: Bundle) -> Array:
     """JᵀJ (p, 3, 3) of each point over the views (K, p) that count, poses held."""
-    B = derivatives(W, bundle)[2]
+    B = Derivatives(bundle).by_point
     return np.asarray(np.einsum("kdcp,kecp->pde", h[:, None, None] * B, B))
 
 

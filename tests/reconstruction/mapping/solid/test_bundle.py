@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reconstruction.basis.rest_shape import RigidMotion
-from reconstruction.mapping.solid.adjustment import Adjustment, adjust, energy, linearise
-from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior, derivatives, off_plane, scaled
+from reconstruction.mapping.solid.adjustment import Adjustment, System, adjust, energy
+from reconstruction.mapping.solid.bundle import Bundle, Derivatives, Loss, Prior, off_plane, scaled
 from tests.reconstruction.world import SEEDS, random_rotation
 
 FREE = Prior(depth=0.0, focal=1.0, kappa=0.2)
@@ -23,9 +23,10 @@ def some(rng: np.random.Generator, K: int = 3, p: int = 7, kappa: float = 0.2) -
 def test_derivatives_agree_with_differences(rng, kappa):
     bundle, step = some(rng, kappa=kappa), 1e-6
     K, p = 3, 7
-    A, b, B, _ = derivatives(bundle.image(), bundle)
+    of = Derivatives(bundle)
     poses, points = rng.normal(size=(K, 6)), rng.normal(size=(3, p))
-    analytic = np.einsum("kacp,ka->kcp", A, poses) + b + np.einsum("kdcp,dp->kcp", B, points)
+    analytic = np.einsum("kacp,ka->kcp", of.by_pose, poses) + of.by_log_kappa
+    analytic += np.einsum("kdcp,dp->kcp", of.by_point, points)
     ahead, behind = (bundle.moved(h * poses, h, h * points).image() for h in (step, -step))
     np.testing.assert_allclose(analytic, (ahead - behind) / (2 * step), rtol=1e-5, atol=1e-6 * np.abs(analytic).max())
 
@@ -36,10 +37,10 @@ def test_right_hand_side_is_minus_the_gradient(rng, redescending, depth):
     bundle, step = some(rng, kappa=0.1), 1e-6
     W = bundle.image() + 0.3 * rng.normal(size=(3, 2, 7))
     h, loss, prior = (rng.random((3, 7)) > 0.2).astype(float), Loss(0.5, redescending), Prior(depth, 2.0, 0.15)
-    system = linearise(W, h, bundle, loss, prior)
+    system = System(W, h, bundle, loss, prior)
     poses, points = rng.normal(size=(3, 6)), rng.normal(size=(3, 7))
     poses[0, [0, 1, 2, 5]] = 0  # the first view's turn and scale are held
-    slope = -(system.right_views[:-1] @ poses.ravel() + system.right_views[-1] + (system.right_points.T * points).sum())
+    slope = -(system.right_views[:-1] @ poses.ravel() + system.right_views[-1] + (system.right_points * points).sum())
     ahead, behind = (energy(W, h, bundle.moved(e * poses, e, e * points), loss, prior) for e in (step, -step))
     np.testing.assert_allclose((ahead - behind) / (2 * step), slope, rtol=1e-4, atol=1e-6)
 
@@ -49,17 +50,17 @@ def test_right_hand_side_is_minus_the_gradient(rng, redescending, depth):
 def test_a_step_solves_the_whole_system(rng):
     bundle = some(rng, K=4, p=9, kappa=0.1)
     W = bundle.image() + 0.1 * rng.normal(size=(4, 2, 9))
-    system = linearise(W, np.ones((4, 9)), bundle, Loss(1.0, redescending=False), FREE)
+    system = System(W, np.ones((4, 9)), bundle, Loss(1.0, redescending=False), FREE)
     poses, log_kappa, points = system.step(0.1)
     n = len(system.right_views)
     whole = np.zeros((n + 27, n + 27))
     whole[:n, :n] = system.views
-    whole[:n, n:] = system.between.transpose(1, 0, 2).reshape(n, 27)
+    whole[:n, n:] = system.between.transpose(0, 2, 1).reshape(n, 27)
     whole[n:, :n] = whole[:n, n:].T
-    for i, block in enumerate(system.points):
+    for i, block in enumerate(system.points.transpose(2, 0, 1)):
         whole[n + 3 * i : n + 3 * i + 3, n + 3 * i : n + 3 * i + 3] = block
     whole[np.diag_indices(len(whole))] *= 1.1
-    expected = np.linalg.solve(whole, np.r_[system.right_views, system.right_points.ravel()])
+    expected = np.linalg.solve(whole, np.r_[system.right_views, system.right_points.T.ravel()])
     np.testing.assert_allclose(np.r_[poses.ravel(), log_kappa, points.T.ravel()], expected, rtol=1e-5, atol=1e-7)
 
 
