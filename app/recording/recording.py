@@ -160,6 +160,7 @@ class Recording:
     def final_pass(self) -> None:
         """The estimates that follow are of the final pass."""
         self._estimates, self._drawn_later = (entities.ESTIMATE,), False
+        self._scene.forget()
 
     def estimate(self, index: int, time_s: float, estimate: ShapeEstimate) -> None:
         """One frame's shape and pose."""

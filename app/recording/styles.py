@@ -104,14 +104,18 @@ class Scene:
     def add(self, shape: Array, camera: Camera) -> bool:
         """Another shape (3, p), in the axes of a camera; whether it is the first."""
         first, self.begun = not self.begun, True
-        if first:
+        if not self._boxes:
             self._camera, self._radius = camera, max(rms_radius(shape), 1e-9)
         self._boxes.extend((*shape.min(axis=1), *shape.max(axis=1)))
         return first
 
+    def forget(self) -> None:
+        """What follows is shown instead of all shapes so far."""
+        self._boxes = array("d")
+
     def transforms(self) -> Iterator[tuple[str, Loggable]]:
         """What brings all shapes so far into sight."""
-        if not self.begun:
+        if not self._boxes:
             return
         boxes = np.reshape(self._boxes, (-1, 6))
         low, high = np.nanpercentile(boxes[:, :3], RARE, axis=0), np.nanpercentile(boxes[:, 3:], 100 - RARE, axis=0)

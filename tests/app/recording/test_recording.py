@@ -204,3 +204,22 @@ def test_a_file_with_a_final_pass_is_drawn_once(tmp_path: Path, run: Run) -> Non
             np.testing.assert_allclose(shown, run.estimates[index if revised else 0].shape.T, rtol=1e-6, atol=1e-5)
         sizes.append(sum(chunk.num_rows for chunk in RrdReader(path).stream() if chunk.entity_path == f"/{entities.MESH}"))
     assert sizes[0] == sizes[1]
+
+
+def test_the_view_is_that_of_the_final_pass(tmp_path: Path, run: Run) -> None:
+    """Shapes on the way may be anywhere else; they are not shown any more."""
+    places = []
+    for on_the_way in (1.0, 3.0):
+        path = tmp_path / f"{on_the_way}.rrd"
+        with record(path, final_pass=True) as recording:
+            recording.rest(run.basis, run.mesh, run.camera, run.picture, run.pixels)
+            for index in range(3):
+                recording.observe(Frame(index, index / 30, run.picture), run.observations[index], phase="tracking")
+                estimate = run.estimates[index]
+                recording.estimate(index, index / 30, replace(estimate, shape=on_the_way * estimate.shape))
+            recording.final_pass()
+            for index in range(3):
+                recording.estimate(index, index / 30, run.estimates[index])
+        rows = read(path)
+        places.append([rows[entities.MESH, f"Transform3D:{part}"][None] for part in ("translation", "scale")])
+    assert places[0] == places[1]
