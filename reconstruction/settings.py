@@ -13,7 +13,7 @@ RecoveredRestShape = Literal["auto", "solid", "sheet", "rigid", "plane"]
 FIRST_LOOKS = (10, 15, 20, 30, 45, 60)  # frames after which a first model is looked for; the last decides
 USUAL_MODES = 20
 MORE_MODES = 40  # of what deforms and is seen well
-MOST_MODES = 80  # of solids that deform much, as faces that pull faces
+MOST_MODES = 80  # of solids that deform, when time is no matter
 PriorName = Literal["rest", "smoothness", "rotation", "scale", "inextensibility"]
 
 
@@ -35,8 +35,8 @@ class Settings:
     each axis, chi-squared of the coordinates, or Jensen-Shannon of the nearness to landmarks. Auto: Jensen-Shannon for a
     solid rest shape, chi-squared for a flat one."""
     modes: Literal["auto"] | int = "auto"
-    """Number of modes r. Auto: 20; 40 or 80 for a solid whose keyframes show that it deforms, 40 for a sheet
-    that they have found, 60 in the final pass."""
+    """Number of modes r. Auto: 20; 40 for a solid whose keyframes show that it deforms, 80 in the final pass; 40 for a
+    sheet that they have found, 60 in the final pass."""
     deformation: Deformation = "auto"
     """How the surface may deform: bend out of its plane, drawing in as a sheet does; in its plane; freely; freely, but
     nearly keeping its lengths. Auto: general for a solid rest shape, inextensible for a flat one."""

@@ -21,7 +21,7 @@ from reconstruction.mapping.selection import Evidence, Kind, select
 from reconstruction.mapping.solid.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.mapping.start import Start, at_once
-from reconstruction.settings import MORE_MODES, USUAL_MODES, Settings
+from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES, Settings
 from reconstruction.state import State
 
 FEWEST_KEYFRAMES = 6
@@ -170,7 +170,7 @@ def map_of(
         if kind == "sheet":
             found = sheet_map(W, camera, whole(), evidence, start, estimate_focal=estimate_focal, given=given, last=last)
         else:
-            found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known)
+            found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known, last=last)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
     told = f"focal length {found.camera.focal_px:.0f} px, from {len(W)} keyframes"
@@ -191,7 +191,7 @@ def lens(camera: Camera, W: Array) -> Camera:
 
 
 def solid_map(
-    W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool, known: Array | None = None
+    W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool, known: Array | None, last: bool
 ) -> Map:
     """The map of a solid; one that deforms holds no focal length.
 
@@ -202,7 +202,8 @@ def solid_map(
     if estimate_focal and np.nanmedian(found.residual_px) > RIGID * rms_radius(found.shape):
         found = bundle_adjust(W, visible, camera, refine_focal=False, known=known)
     rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
-    return Map(rest, found.camera, modes=modes_held(W, visible, found, camera), evidence=evidence)
+    modes = modes_held(W, visible, found, camera, MOST_MODES if last else MORE_MODES)
+    return Map(rest, found.camera, modes=modes, evidence=evidence)
 
 
 def sheet_map(

@@ -10,7 +10,7 @@ from reconstruction.basis.constraints import ALL_ROWS, ROWS, Bending, CoarseEdge
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import is_flat
 from reconstruction.camera import Camera
-from reconstruction.settings import Deformation
+from reconstruction.settings import USUAL_MODES, Deformation
 from reconstruction.state import State
 from reconstruction.window import priors
 
@@ -92,9 +92,10 @@ def build_energy(
         linear: with bending, leave rows α and β at rest as the paper does, instead of letting the sheet draw in.
     """
     weights = priors.weights(chosen or {}, deformation, perspective=model.camera.perspective, paper=paper)
-    # A mode's eigenvalue says how much of the shape's extent it carries: weak modes are pulled to rest harder.
+    # A mode's eigenvalue says how much of the shape's extent it carries: weak modes are pulled to rest harder. By the
+    # first ones, so that those are held alike however many there are.
     stiffness = model.basis.eigenvalues**-0.5
-    stiffness /= np.exp(np.log(stiffness).mean())
+    stiffness /= np.exp(np.log(stiffness[:USUAL_MODES]).mean())
     adaptive = deformation in ("general", "stretching") and not paper and weights["smoothness"] > 0
     draws_in = deformation == "bending" and not (paper or linear)
     edges = model.coarse_edges() if draws_in or weights["inextensibility"] else None

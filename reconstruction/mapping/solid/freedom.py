@@ -1,6 +1,7 @@
-"""How many modes a solid needs: more than usual if those predict points of the keyframes that they are not fitted to."""
+"""How many modes a solid needs: more than usual while those predict points of the keyframes that they are not fitted to."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,11 +17,10 @@ from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES
 
 COUNTED = 2000  # points, at most about so many: of dense ones every so many tell as much
 COMPARED = 0.8  # of the points: no more modes can be compared
-BETTER = 0.97  # times what the usual modes leave over: less than that is worth the time of more,
-MUCH_BETTER = 0.75  # … and so many times less than those, the time of most: two to three times as much
+BETTER = 0.97  # times what half as many modes leave over: less than that is worth the time of more
 
 
-def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera) -> int:
+def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera, most: int = MOST_MODES) -> int:
     """Number of modes for a solid.
 
     What its rigid shape leaves over in each keyframe is fitted by the modes; by generalised cross validation, more of them
@@ -33,22 +33,22 @@ def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera) -> int:
         visible: (K, p).
         solid: the rigid shape posed in the keyframes.
         camera: as it was made for.
+        most: that there is time for.
     """
     some = np.arange(0, W.shape[2], 1 + W.shape[2] // COUNTED)
     W, visible, motion = W[:, :, some], visible[:, some], replace(solid.motion, shape=solid.shape[:, some])
     p = len(some)
-    most = min(MOST_MODES, int(COMPARED * p))
-    if most <= USUAL_MODES or len(W) < KEYFRAMES:
+    counts = [count for count in (USUAL_MODES, MORE_MODES, MOST_MODES) if count <= min(most, COMPARED * p)]
+    if len(counts) < 2 or len(W) < KEYFRAMES:
         return USUAL_MODES
-    more = min(MORE_MODES, most)
     shape = motion.shape
-    modes = modal_basis(shape, triangulate((principal_axes(shape).T @ shape)[:2].T), most, "jensen-shannon").Upsilon
+    mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
+    modes = modal_basis(shape, mesh, counts[-1], "jensen-shannon").Upsilon
     functions = np.concatenate([np.full((1, p), p**-0.5), modes])
     left = W - camera.center_px[:, None] - Bundle(motion, 1 / solid.camera.focal_px).image()
-    by = {count: left_over(left, visible, functions[: count + 1]) for count in (USUAL_MODES, more, most)}
-    if most > more and by[more] < BETTER * by[USUAL_MODES] and by[most] < MUCH_BETTER * by[more]:
-        return MOST_MODES
-    return MORE_MODES if by[more] < BETTER * by[USUAL_MODES] else USUAL_MODES
+    by = [left_over(left, visible, functions[: count + 1]) for count in counts]
+    better = [twice < BETTER * once for once, twice in pairwise(by)]
+    return counts[[*better, False].index(False)]
 
 
 def left_over(residuals: Array, visible: Mask, functions: Array) -> float:
