@@ -38,8 +38,9 @@ def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera, most: int 
     some = np.arange(0, W.shape[2], 1 + W.shape[2] // COUNTED)
     W, visible, motion = W[:, :, some], visible[:, some], replace(solid.motion, shape=solid.shape[:, some])
     p = len(some)
-    counts = [count for count in (USUAL_MODES, MORE_MODES, MOST_MODES) if count <= min(most, COMPARED * p)]
-    if len(counts) < 2 or len(W) < KEYFRAMES:
+    held = [USUAL_MODES, *(count for count in (MORE_MODES, MOST_MODES) if count <= most)]
+    counts = np.minimum(held, int(COMPARED * p))
+    if counts[1] <= USUAL_MODES or len(W) < KEYFRAMES:
         return USUAL_MODES
     shape = motion.shape
     mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
@@ -48,7 +49,7 @@ def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera, most: int 
     left = W - camera.center_px[:, None] - Bundle(motion, 1 / solid.camera.focal_px).image()
     by = [left_over(left, visible, functions[: count + 1]) for count in counts]
     better = [twice < BETTER * once for once, twice in pairwise(by)]
-    return counts[[*better, False].index(False)]
+    return held[[*better, False].index(False)]
 
 
 def left_over(residuals: Array, visible: Mask, functions: Array) -> float:
