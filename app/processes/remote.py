@@ -4,6 +4,7 @@ import os
 import traceback
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import ForkingPickler
 from typing import Any
 
 from app.processes.child import child
@@ -25,8 +26,12 @@ class Remote:
 
     def send(self, message: object) -> None:
         """A message for it. Raises a UsageError if the process has ended."""
+        self.send_packed(packed(message))
+
+    def send_packed(self, message: bytes) -> None:
+        """The same of one that is `packed`."""
         try:
-            self._connection.send(message)
+            self._connection.send_bytes(message)
         except OSError as error:
             raise self._ended() from error
 
@@ -57,6 +62,11 @@ class Remote:
 
     def _ended(self) -> UsageError:
         return UsageError(f"the process that {self._does} has ended: the memory may be full")
+
+
+def packed(message: object) -> bytes:
+    """A message as it is now, so that it may be sent by another thread, whatever is done to its parts meanwhile."""
+    return bytes(ForkingPickler.dumps(message))
 
 
 def serve(connection: Connection, answer: Callable[[Any], Any]) -> None:

@@ -6,7 +6,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from app.processes.child import NICE, connection_to_parent
-from app.processes.remote import Remote, serve
+from app.processes.remote import Remote, packed, serve
 
 
 class MapProcess:
@@ -18,7 +18,7 @@ class MapProcess:
 
     def begin(self, function: Callable[..., Any], *arguments: object) -> "Future[Any]":
         """Begin a call; the future's result raises what it raised, or a UsageError if the process has ended."""
-        return self._calls.submit(self._call, function, *arguments)
+        return self._calls.submit(self._call, packed((function, arguments)))
 
     def __enter__(self) -> Self:
         return self
@@ -28,8 +28,8 @@ class MapProcess:
         self._calls.shutdown(cancel_futures=True)
         self._remote.close()
 
-    def _call(self, function: Callable[..., Any], *arguments: object) -> Any:
-        self._remote.send((function, arguments))
+    def _call(self, message: bytes) -> Any:
+        self._remote.send_packed(message)
         return self._remote.receive()
 
 

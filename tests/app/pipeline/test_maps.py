@@ -1,6 +1,7 @@
 """Models from another process: the same, errors too; and nothing is left of it."""
 
 import signal
+from time import sleep
 
 import numpy as np
 import pytest
@@ -24,6 +25,15 @@ def test_a_model_is_the_same_from_there() -> None:
     assert here is not None
     np.testing.assert_array_equal(found.rest.motion.shape, here.rest.motion.shape)
     assert found.rest.note == here.rest.note
+
+
+def test_arguments_are_those_of_the_call() -> None:
+    values = [1, 2]
+    with MapProcess() as maps:
+        maps.begin(sleep, 0.1)  # what comes after it is not sent yet
+        there = maps.begin(sum, values)
+        values.append(3)
+        assert there.result() == 3
 
 
 def test_errors_come_back() -> None:
