@@ -44,6 +44,7 @@ ARROWS = {
     "reconstruction.mapping": {"reconstruction.basis", "reconstruction.window"},
     "reconstruction.evaluation": {"reconstruction.basis"},
     "reconstruction.online": {"reconstruction.basis", "reconstruction.window", "reconstruction.mapping"},
+    "reconstruction.unknown_camera": {"reconstruction.mapping"},
     "modeshape": WORKED | {"app.shared", "app.commands"},
 }
 TERMINAL_AND_VIEWER = {"rerun", "rerun_cli", "tyro", "rich"}

@@ -34,7 +34,8 @@ class FromTracks:
     """Where the rest shape of tracks comes from: all frames (auto, or told what it is: solid, sheet), the first ones alone
     (rigid, plane), the first true shape, or a mesh file."""
     camera: Literal["auto", "perspective", "orthographic"] = "auto"
-    """Auto: perspective if the tracks have K, else orthographic."""
+    """Auto: perspective if the tracks have K; without it the one under which what is seen changes less, by all frames,
+    orthographic in doubt, with --no-final-pass, and with a rest shape from elsewhere or the first frames."""
     model: tyro.conf.OmitArgPrefixes[Model] = field(default_factory=Model)
 
 

@@ -25,7 +25,9 @@ from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import score, with_missing, with_noise, with_outliers
+from reconstruction.mapping.selection import Kind
 from reconstruction.online import Reconstruction
+from reconstruction.unknown_camera import likely_camera
 from tracking.extent import check_extent
 from tracking.tracks import Tracks
 
@@ -101,7 +103,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
         W, visible = W[:, :, kept], visible[:, kept]
         progress.log(f"{int((~kept).sum())} of {points} points are seen in fewer than {FEWEST_FRAMES} frames: left out")
     check_extent(W, visible)
-    reconstruction = prepare(config, tracks)
+    reconstruction = prepare(config, tracks, W, visible, progress)
     collected = Collected(everything=True)
     with progress:
         progress.expect(frames)
@@ -165,15 +167,23 @@ def reconstructed(reconstruction: Reconstruction, W: Array, visible: Flags, prog
     return estimates
 
 
-def prepare(config: Evaluate, tracks: Tracks) -> Reconstruction:
-    """The estimator for given tracks, before their first frame.
+def prepare(config: Evaluate, tracks: Tracks, W: Array, visible: Flags, progress: Progress) -> Reconstruction:
+    """The estimator for given tracks, seen as W (F, 2, P) px and visible (F, P), before their first frame.
 
     Raises:
         UsageError: no such rest shape or camera in the file.
     """
     given, mesh = given_rest_shape(config, tracks)
     settings = settings_of(config.model, config.rest_shape, estimate_focal=config.model.focal == "auto")
-    return Reconstruction(camera_of(config, tracks), settings, given, mesh)
+    camera = camera_of(config, tracks)
+    kinds: dict[str, Kind | None] = {"auto": None, "solid": "solid", "sheet": "sheet"}
+    unknown = config.camera == "auto" and not camera.perspective and config.model.energy != "paper"
+    if unknown and config.final_pass and config.rest_shape in kinds:
+        camera = likely_camera(W, visible, kinds[config.rest_shape])
+        if camera.perspective:
+            settings = replace(settings, estimate_focal=True)
+            progress.log("no camera is given, but what is seen changes less in perspective (--camera orthographic)")
+    return Reconstruction(camera, settings, given, mesh)
 
 
 def given_rest_shape(config: Evaluate, tracks: Tracks) -> tuple[RestShape | None, Mesh | None]:

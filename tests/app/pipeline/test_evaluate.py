@@ -10,6 +10,7 @@ from app.options.model import Model
 from app.pipeline.evaluate import Evaluation, evaluate
 from app.terminal.progress import Progress
 from reconstruction.basis.mesh import triangulate
+from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 from tests.reconstruction.runs import swelling_hill
 from tracking import TrackingError
 
@@ -98,6 +99,19 @@ def test_errors_are_as_large_as_predicted(shared_data: Path, file: str, rest: st
     assert score is not None
     assert score.error_over_sigma is not None
     assert 0.5 < score.error_over_sigma < 2
+
+
+@SLOW
+def test_tracks_without_a_camera_say_which(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.npz"
+    W, S = waving_sheet(np.random.default_rng(5), 60)
+    np.savez(path, W=W, S_gt=S)
+    found, told = (evaluate(Evaluate(path, camera=camera), Progress()) for camera in ("auto", "orthographic"))
+    assert told.focal_px is None
+    assert found.focal_px == pytest.approx(CAMERA.focal_px, rel=0.1)
+    assert found.score is not None
+    assert told.score is not None
+    assert found.score.e3d < 0.02 < 0.05 < told.score.e3d
 
 
 def hostile(name: str, W: np.ndarray, visible: np.ndarray) -> dict[str, np.ndarray]:

@@ -1,0 +1,45 @@
+"""The camera of tracks that nobody knows the camera of: orthographic, or in perspective."""
+
+import numpy as np
+
+from reconstruction.arrays import Array, Mask
+from reconstruction.camera import Camera
+from reconstruction.mapping.keyframes import Keyframes
+from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.selection import Kind
+
+USUAL_LENS = 5.0  # focal length over the object's size, RMS: of what fills half a picture
+CLEARLY = 0.85  # times what the object changes before an orthographic camera: less is proof of perspective
+
+
+def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
+    """The camera before which an object changes least, by keyframes; orthographic where they do not tell.
+
+    What a camera in perspective sees of a sheet or solid, no orthographic one explains, and the other way round: in
+    perspective the same thing would change its lengths or its shape.
+
+    Args:
+        W: (F, 2, p) px, or normalised; anything where not visible.
+        visible: (F, p).
+        kind: of object, if that is known.
+    """
+    keyframes = Keyframes()
+    for k, (w, h) in enumerate(zip(W, visible, strict=True)):
+        keyframes.offer(k, w, h)
+    if not keyframes.frames:
+        return Camera()
+    W, visible, _ = keyframes.spread()
+    size = float(np.nanmedian(np.sqrt(np.nanvar(W, axis=2).sum(axis=1))))
+    parallel = map_of(W, visible, Camera(), estimate_focal=False, kind=kind)
+    near = map_of(W, visible, Camera(USUAL_LENS * size, np.nanmean(W, axis=(0, 2))), estimate_focal=True, kind=kind)
+    if near and not near.sheet:  # its evidence is by the focal length assumed
+        near = map_of(W, visible, near.camera, estimate_focal=False, kind=kind)
+    return near.camera if parallel and near and changes(near, parallel) < CLEARLY * changes(parallel, near) else Camera()
+
+
+def changes(one: Map, other: Map) -> float:
+    """How much an object changes, comparable with another: lengths of a sheet, or what its kind leaves over, in pixels."""
+    if one.sheet and other.sheet:
+        return one.sheet.strain_rms
+    assert one.evidence
+    return (one.evidence.sheet if one.sheet else one.evidence.solid).edges_px

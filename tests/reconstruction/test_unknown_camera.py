@@ -1,0 +1,42 @@
+"""A camera that nobody knows is told by what it sees: solids and sheets, near and far, in any unit."""
+
+import numpy as np
+import pytest
+
+from reconstruction.camera import Camera
+from reconstruction.unknown_camera import likely_camera
+from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
+
+FRAMES, POINTS = 30, 120
+
+
+def solid_seen(camera: Camera) -> np.ndarray:
+    """Images (F, 2, p) px."""
+    rng = np.random.default_rng(2)
+    W, _ = seen(np.repeat(relief(rng, POINTS)[None], FRAMES, axis=0), turns(FRAMES), camera)
+    return W + 0.1 * rng.normal(size=W.shape)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_of_a_solid(unit: float) -> None:
+    everything = np.ones((FRAMES, POINTS), bool)
+    assert not likely_camera(unit * solid_seen(ORTHOGRAPHIC), everything).perspective
+    found = likely_camera(unit * solid_seen(PERSPECTIVE), everything)
+    assert found.focal_px == pytest.approx(unit * PERSPECTIVE.focal_px, rel=0.1)
+
+
+def test_of_a_sheet() -> None:
+    rng = np.random.default_rng(5)
+    W, S = waving_sheet(rng, FRAMES)
+    visible = rng.random((FRAMES, W.shape[2])) > 0.2
+    found = likely_camera(np.where(visible[:, None], W, np.nan), visible)
+    assert found.focal_px == pytest.approx(CAMERA.focal_px, rel=0.15)
+    parallel = 200 * S[:, :2] + 0.1 * rng.normal(size=W.shape)
+    assert not likely_camera(np.where(visible[:, None], parallel, np.nan), visible).perspective
+
+
+def test_few_frames_do_not_tell() -> None:
+    W = solid_seen(PERSPECTIVE)[:4]
+    assert not likely_camera(W, np.ones((4, POINTS), bool)).perspective
+    assert not likely_camera(W, np.zeros((4, POINTS), bool)).perspective
