@@ -192,7 +192,7 @@ class System:
 
     @cached_property
     def _pose(self) -> Array:
-        A = self.derivatives.by_pose
+        A = self.derivatives.by_pose  # asked for here only
         A[0, FIXED] = 0.0
         return A
 
