@@ -10,7 +10,7 @@ from reconstruction.mapping import rest_shape
 from reconstruction.mapping.evidence import TURN_DEGREES, weigh
 from reconstruction.mapping.factorization import view_turn_degrees
 from reconstruction.mapping.keyframes import FEWEST_SEEN
-from reconstruction.mapping.map import Map
+from reconstruction.mapping.map import ASSUMED, Map
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.settings import Settings
 
@@ -63,4 +63,4 @@ def first_map(rest: RestShape, camera: Camera, settings: Settings) -> Map:
     """The map of a rest shape; first frames hardly hold a focal length."""
     if not (settings.estimate_focal and camera.perspective):
         return Map(rest, camera)
-    return Map(rest, camera, focal_note=f"focal length {camera.focal_px:.0f} px assumed: give it if you know better")
+    return Map(rest, camera, focal_note=ASSUMED.format(camera.focal_px))

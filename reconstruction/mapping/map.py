@@ -27,6 +27,7 @@ from reconstruction.state import State
 FEWEST_KEYFRAMES = 6
 FEWEST_POINTS = 20
 LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
+ASSUMED = "focal length {:.0f} px assumed: give it if you know better"
 RIGID = 0.005  # residual over the size, up to which a solid is rigid enough to hold a focal length
 
 
@@ -173,7 +174,8 @@ def map_of(
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known, last=last)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
-    told = f"focal length {found.camera.focal_px:.0f} px, from {len(W)} keyframes"
+    told, focal_px = f"focal length {{:.0f}} px, from {len(W)} keyframes", found.camera.focal_px
+    told = (ASSUMED if np.isclose(focal_px, camera.focal_px, rtol=1e-9) else told).format(focal_px)
     return replace(found, seen=visible, focal_note=told if estimate_focal and camera.perspective else "")
 
 

@@ -116,6 +116,18 @@ def test_a_solid() -> None:
     assert found.foreseen([(W[0], np.ones(120, bool))]) == [None]
 
 
+@pytest.mark.parametrize("deforms", [False, True])
+def test_a_focal_length_that_is_only_assumed_is_told_to_be(deforms: bool) -> None:
+    rng = np.random.default_rng(3)
+    swell = 1 + 0.08 * deforms * rng.normal(size=(16, 1, 1)) * np.array([[1.0], [-1.0], [1.0]])
+    W, _ = seen(swell * relief(rng, 120), turns(16, 30.0), PERSPECTIVE)
+    W = W + rng.normal(0, 0.1, W.shape)
+    assumed = replace(PERSPECTIVE, focal_px=600.0)
+    found = map_of(W, np.ones((16, 120), bool), assumed, estimate_focal=True, kind="solid")
+    assert found is not None
+    assert found.focal_note.startswith("focal length 600 px assumed" if deforms else "focal length 5")
+
+
 def test_what_it_is_may_be_told() -> None:
     W, _, _ = waving()
     found = map_of(W[::2], np.ones((FRAMES // 2, POINTS), bool), CAMERA, estimate_focal=False, kind="solid")
