@@ -182,7 +182,7 @@ def prepare(config: Evaluate, tracks: Tracks, W: Array, visible: Flags, progress
         camera = likely_camera(W, visible, kinds[config.rest_shape])
         if camera.perspective:
             settings = replace(settings, estimate_focal=True)
-            progress.log("no camera is given, but what is seen changes less in perspective (--camera orthographic)")
+            progress.log("no camera is given; what is seen changes less in perspective: --camera orthographic overrules")
     return Reconstruction(camera, settings, given, mesh)
 
 
