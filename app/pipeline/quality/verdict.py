@@ -11,8 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from app.arrays import Array, Flags
-from reconstruction.basis.rest_shape import rms_radius
+from app.arrays import Flags
+from reconstruction.basis.rest_shape import RigidMotion, rms_radius
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
@@ -36,7 +36,7 @@ FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 # What a solid that does not deform leaves over, over its radius: by more, what changes is no longer small.
-POOR_CHANGE = 0.035
+POOR_CHANGE = 0.028
 # Of that what neighbours share, which is no noise, over the sine of its turn: as much its depth may be off, and more.
 FAIR_DEPTH = 0.0125
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
@@ -208,21 +208,22 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
     if found.rest.kind == "rigid":
-        yield from of_solid(found.rest.motion.shape, found.evidence)
+        yield from of_solid(found.rest.motion, found.evidence)
     if found.sheet is not None:
         yield from of_sheet(found.sheet, perspective=found.camera.perspective)
 
 
-def of_solid(shape: Array, evidence: Evidence) -> Iterator[Verdict]:
-    """What a solid's changes, turn and depth (shape (3, p), px) say."""
-    whole, edges = np.array([evidence.solid.whole_px, evidence.solid.edges_px]) / rms_radius(shape)
+def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
+    """What a solid's changes, turn and depth say."""
+    radius_px = float(np.median(motion.s)) * rms_radius(motion.shape)  # in the images: the shape may have any size
+    whole, edges = np.array([evidence.solid.whole_px, evidence.solid.edges_px]) / radius_px
     turn = evidence.turn_degrees
     told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
     if whole > POOR_CHANGE:
         yield Verdict("poor", told)
     elif np.sqrt(max(whole**2 - edges**2, 0.0)) > FAIR_DEPTH * np.sin(np.radians(min(turn, 90.0))):
         yield Verdict("fair", f"{told}; film it turning more")
-    deep, half = relief(shape), evidence.relief
+    deep, half = relief(motion.shape), evidence.relief
     if max(deep, half) > OTHERWISE_DEEP * min(deep, half):
         told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"
         yield Verdict("fair", f"{told}; film it turning more")

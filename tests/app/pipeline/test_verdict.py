@@ -91,9 +91,10 @@ def test_what_may_as_well_be_something_else() -> None:
 )  # fmt: skip
 def test_the_depth_of_a_solid_that_changes(whole_px: float, edges_px: float, turn_degrees: float, grade: str) -> None:
     seen = replace(EVIDENCE, solid=Misfit(edges_px, whole_px), turn_degrees=turn_degrees)
-    said = verdict(course([0.001] * 50), replace(SOLID, evidence=seen))
-    assert said.grade == grade
-    assert ("how deep it is is a guess" in said.reason) == (grade != "good")
+    for size in (1.0, 5.0):  # of another model, as large as the one before
+        said = verdict(course([0.001] * 50), replace(SOLID, evidence=seen).scaled(size))
+        assert said.grade == grade
+        assert ("how deep it is is a guess" in said.reason) == (grade != "good")
 
 
 @pytest.mark.parametrize("factor", [0.5, 2.0])
