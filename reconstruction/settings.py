@@ -61,6 +61,11 @@ class Settings:
         """Whether keyframes say what the object is: not with one of the first frames or the paper's energy."""
         return self.revise and self.rest_shape not in ("rigid", "plane") and self.energy != "paper"
 
+    @property
+    def kind(self) -> Literal["solid", "sheet"] | None:
+        """What the object is, if that is told; keyframes say the rest."""
+        return self.rest_shape if self.rest_shape in ("solid", "sheet") else None
+
     def __post_init__(self) -> None:
         if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:
             problem = f"bootstrap_frames {self.bootstrap_frames} is too few: give auto, or 2 and more"

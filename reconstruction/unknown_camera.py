@@ -1,15 +1,12 @@
 """The camera of tracks that nobody knows the camera of: orthographic, or in perspective."""
 
-import numpy as np
-
 from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
-from reconstruction.mapping.keyframes import Keyframes
-from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.keyframes import Keyframes, thinned
+from reconstruction.mapping.map import Map, lens, map_of
 from reconstruction.mapping.selection import Kind
 
 USUAL_LENS = 5.0  # focal length over the object's size, RMS: of what fills half a picture
-COUNTED = 2000  # points, at most about so many: of dense ones every so many tell as much
 CLEARLY = 0.85  # times what the object changes before an orthographic camera: less is proof of perspective
 
 
@@ -24,16 +21,15 @@ def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
         visible: (F, p).
         kind: of object, if that is known.
     """
-    some = np.arange(0, W.shape[2], 1 + W.shape[2] // COUNTED)
+    some = thinned(W.shape[2])
     keyframes = Keyframes()
     for k, (w, h) in enumerate(zip(W[:, :, some], visible[:, some], strict=True)):
         keyframes.offer(k, w, h)
     if not keyframes.frames:
         return Camera()
     W, visible, _ = keyframes.spread()
-    size = float(np.nanmedian(np.sqrt(np.nanvar(W, axis=2).sum(axis=1))))
     parallel = map_of(W, visible, Camera(), estimate_focal=False, kind=kind)
-    near = map_of(W, visible, Camera(USUAL_LENS * size, np.nanmean(W, axis=(0, 2))), estimate_focal=True, kind=kind)
+    near = map_of(W, visible, lens(W, USUAL_LENS), estimate_focal=True, kind=kind)
     if near and not near.sheet:  # its evidence is by the focal length assumed
         near = map_of(W, visible, near.camera, estimate_focal=False, kind=kind)
     return near.camera if parallel and near and changes(near, parallel) < CLEARLY * changes(parallel, near) else Camera()

@@ -78,10 +78,8 @@ def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh
     from tracking.tracks import Tracks
 
     tracks = Tracks.load(command.source)
-    asked = Evaluate(
-        command.source, rest_shape=command.rest_shape, camera=command.camera, model=command.model, final_pass=False
-    )
-    reconstruction = prepare(asked, tracks, tracks.W, tracks.visible, progress)
+    asked = Evaluate(command.source, rest_shape=command.rest_shape, camera=command.camera, model=command.model)
+    reconstruction = prepare(asked, tracks, progress)
     for W, visible in zip(tracks.W, tracks.visible, strict=True):
         reconstruction.update(np.where(visible, W, np.nan), visible)
         progress.advance("rest shape")

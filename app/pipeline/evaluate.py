@@ -25,7 +25,6 @@ from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import score, with_missing, with_noise, with_outliers
-from reconstruction.mapping.selection import Kind
 from reconstruction.online import Reconstruction
 from reconstruction.unknown_camera import likely_camera
 from tracking.extent import check_extent
@@ -103,7 +102,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
         W, visible = W[:, :, kept], visible[:, kept]
         progress.log(f"{int((~kept).sum())} of {points} points are seen in fewer than {FEWEST_FRAMES} frames: left out")
     check_extent(W, visible)
-    reconstruction = prepare(config, tracks, W, visible, progress)
+    reconstruction = prepare(config, tracks, progress, (W, visible) if config.final_pass else None)
     collected = Collected(everything=True)
     with progress:
         progress.expect(frames)
@@ -167,8 +166,16 @@ def reconstructed(reconstruction: Reconstruction, W: Array, visible: Flags, prog
     return estimates
 
 
-def prepare(config: Evaluate, tracks: Tracks, W: Array, visible: Flags, progress: Progress) -> Reconstruction:
-    """The estimator for given tracks, seen as W (F, 2, P) px and visible (F, P), before their first frame.
+def prepare(
+    config: Evaluate, tracks: Tracks, progress: Progress, frames: tuple[Array, Flags] | None = None
+) -> Reconstruction:
+    """The estimator for given tracks, before their first frame.
+
+    Args:
+        config: what the person asked for.
+        tracks: the file.
+        progress: is told if a camera has been found.
+        frames: points (F, 2, P) px and visibility (F, P) in all frames, to find a camera by that nobody knows.
 
     Raises:
         UsageError: no such rest shape or camera in the file.
@@ -176,10 +183,9 @@ def prepare(config: Evaluate, tracks: Tracks, W: Array, visible: Flags, progress
     given, mesh = given_rest_shape(config, tracks)
     settings = settings_of(config.model, config.rest_shape, estimate_focal=config.model.focal == "auto")
     camera = camera_of(config, tracks)
-    kinds: dict[str, Kind | None] = {"auto": None, "solid": "solid", "sheet": "sheet"}
-    unknown = config.camera == "auto" and not camera.perspective and config.model.energy != "paper"
-    if unknown and config.final_pass and config.rest_shape in kinds:
-        camera = likely_camera(W, visible, kinds[config.rest_shape])
+    unknown = config.camera == "auto" and not camera.perspective
+    if frames and unknown and given is None and settings.maps:
+        camera = likely_camera(*frames, settings.kind)
         if camera.perspective:
             settings = replace(settings, estimate_focal=True)
             progress.log("no camera is given; what is seen changes less in perspective: --camera orthographic overrules")

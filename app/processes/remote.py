@@ -28,7 +28,7 @@ class Remote:
         """A message for it. Raises a UsageError if the process has ended."""
         self.send_packed(packed(message))
 
-    def send_packed(self, message: bytes) -> None:
+    def send_packed(self, message: memoryview) -> None:
         """The same of one that is `packed`."""
         try:
             self._connection.send_bytes(message)
@@ -64,9 +64,9 @@ class Remote:
         return UsageError(f"the process that {self._does} has ended: the memory may be full")
 
 
-def packed(message: object) -> bytes:
+def packed(message: object) -> memoryview:
     """A message as it is now, so that it may be sent by another thread, whatever is done to its parts meanwhile."""
-    return bytes(ForkingPickler.dumps(message))
+    return ForkingPickler.dumps(message)
 
 
 def serve(connection: Connection, answer: Callable[[Any], Any]) -> None:

@@ -9,6 +9,7 @@ FEWEST_SHARED = 12  # points that two frames must share to be compared
 FEWEST_SEEN = 0.25  # of the points that another frame showed it must show
 SWEEPS = 3  # of re-weighting, against gross errors
 TINY = 1e-12  # squared difference, relative, that counts as none
+ENOUGH = 2000  # points to compare by
 
 
 class Keyframes:
@@ -101,6 +102,11 @@ def difference(W: Array, visible: Mask, others: Array, others_visible: Mask) -> 
         h = both / (1 + squared / (9 * usual[:, None] + TINY)) ** 2
     apart = np.sqrt((h * squared).sum(axis=1, dtype=np.float64) / np.maximum(h.sum(axis=1), 1e-12))
     return np.where(both.sum(axis=1) >= FEWEST_SHARED, apart, np.inf)
+
+
+def thinned(points: int) -> Indices:
+    """Some of so many points, at most about `ENOUGH`: of dense ones every so many tell as much."""
+    return np.arange(0, points, 1 + points // ENOUGH)
 
 
 def nearest_pair(apart: Array) -> tuple[int, int, float]:

@@ -156,7 +156,7 @@ def map_of(
     if len(W) < FEWEST_KEYFRAMES or (given is not None and not camera.perspective):
         return None
     try:
-        seen_by = lens(camera, W)
+        seen_by = camera if camera.perspective else lens(W, LONG_LENS)
         whole = cache(lambda: sheet(W, visible, seen_by))
         evidence = select(
             W,
@@ -174,8 +174,9 @@ def map_of(
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known, last=last)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
-    told, focal_px = f"focal length {{:.0f}} px, from {len(W)} keyframes", found.camera.focal_px
-    told = (ASSUMED if np.isclose(focal_px, camera.focal_px, rtol=1e-9) else told).format(focal_px)
+    focal_px = found.camera.focal_px
+    assumed = np.isclose(focal_px, camera.focal_px, rtol=1e-9)
+    told = ASSUMED.format(focal_px) if assumed else f"focal length {focal_px:.0f} px, from {len(W)} keyframes"
     return replace(found, seen=visible, focal_note=told if estimate_focal and camera.perspective else "")
 
 
@@ -184,12 +185,10 @@ def through(found: IsometricSheet, W: Array) -> tuple[Array, Array]:
     return found.shapes(), found.through(W)
 
 
-def lens(camera: Camera, W: Array) -> Camera:
-    """The camera, if it is in perspective, else a long lens that sees points (K, 2, p) px as it does."""
-    if camera.perspective:
-        return camera
+def lens(W: Array, sizes: float) -> Camera:
+    """A camera in perspective before points (K, 2, p) px, NaN where not seen, its focal length so many times their size."""
     size = float(np.nanmedian(np.sqrt(np.nanvar(W, axis=2).sum(axis=1))))
-    return Camera(LONG_LENS * size, np.nanmean(W, axis=(0, 2)))
+    return Camera(sizes * size, np.nanmean(W, axis=(0, 2)))
 
 
 def solid_map(

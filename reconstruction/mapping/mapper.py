@@ -12,7 +12,6 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.bootstrap import bootstrap
 from reconstruction.mapping.keyframes import Keyframes, difference
 from reconstruction.mapping.map import Map, map_of
-from reconstruction.mapping.selection import Kind
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import FIRST_LOOKS, Settings
@@ -63,7 +62,6 @@ class Mapper:
         self._settings, self.start, self.latency, self._live = settings, start, latency, live
         self._frames = np.inf if frames is None else frames
         self._given = given
-        self._kind: Kind | None = settings.rest_shape if settings.rest_shape in ("solid", "sheet") else None
         refined = settings.refine_rest and settings.deformation in ("auto", "inextensible")
         self._keyframes = Keyframes() if settings.maps and (given is None or refined) else None
         self._frame = -1
@@ -124,7 +122,7 @@ class Mapper:
         if self._keyframes is None or not self._keyframes.frames:
             return None
         W, visible, _ = self._keyframes.spread()
-        asked = camera, self._settings.estimate_focal, self._known, self.start, self._given, self._kind
+        asked = camera, self._settings.estimate_focal, self._known, self.start, self._given, self._settings.kind
         found = map_of(W, visible, *asked, last=True) or self._found
         return found and self._begin and nearest_first(found, *self._begin)
 
@@ -160,7 +158,7 @@ class Mapper:
             return
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
             self._version, self._extent = keyframes.version, keyframes.extent
-            asked = camera, self._settings.estimate_focal, self._known, at_once, self._given, self._kind
+            asked = camera, self._settings.estimate_focal, self._known, at_once, self._given, self._settings.kind
             begun = self.start(with_modes, map_of, self._settings, *keyframes.spread()[:2], *asked)
             self._map_job = Job(begun, self._frame + self.latency)
 

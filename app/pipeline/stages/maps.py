@@ -28,7 +28,7 @@ class MapProcess:
         self._calls.shutdown(cancel_futures=True)
         self._remote.close()
 
-    def _call(self, message: bytes) -> Any:
+    def _call(self, message: memoryview) -> Any:
         self._remote.send_packed(message)
         return self._remote.receive()
 

@@ -10,12 +10,11 @@ from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import Camera
-from reconstruction.mapping.keyframes import KEYFRAMES
+from reconstruction.mapping.keyframes import KEYFRAMES, thinned
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.solid import Solid
 from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES
 
-COUNTED = 2000  # points, at most about so many: of dense ones every so many tell as much
 COMPARED = 0.8  # of the points: no more modes can be compared
 BETTER = 0.97  # times what half as many modes leave over: less than that is worth the time of more
 
@@ -35,7 +34,7 @@ def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera, most: int 
         camera: as it was made for.
         most: that there is time for.
     """
-    some = np.arange(0, W.shape[2], 1 + W.shape[2] // COUNTED)
+    some = thinned(W.shape[2])
     W, visible, motion = W[:, :, some], visible[:, some], replace(solid.motion, shape=solid.shape[:, some])
     p = len(some)
     held = [USUAL_MODES, *(count for count in (MORE_MODES, MOST_MODES) if count <= most)]
