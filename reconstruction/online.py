@@ -233,7 +233,8 @@ class Reconstruction:
         self.deformation = constraints.fitting(self.settings.deformation, flat=found.is_sheet)
         self.metric = distances.fitting(self.settings.metric, flat=found.is_sheet)
         paper = self.settings.energy == "paper"
-        energy = build_energy(model, self.deformation, self.settings.priors, paper=paper)
+        pull = None if found.deformations is None else found.deformations.pull(model.B.shape[1])
+        energy = build_energy(model, self.deformation, self.settings.priors, paper=paper, pull=pull)
         keeps_lengths = self.deformation in ("bending", "inextensible")
         refine = self.settings.refine_rest and keeps_lengths and not paper and found.sheet is None
         self.window = SlidingWindow(

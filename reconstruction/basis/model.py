@@ -53,6 +53,12 @@ class Model:
         """The same in other units of the rest shape: so many times as many, each so much smaller."""
         return Model(replace(self.basis, rest=factor * self.basis.rest), self.mesh, self.camera, self.scale / factor)
 
+    def mirrored(self) -> "Model":
+        """The same with its depth reversed; of Λ', row τ, too."""
+        flip = np.diag([1.0, 1.0, -1.0])
+        basis = replace(self.basis, rest=flip @ self.basis.rest, Phi=flip @ self.basis.Phi @ flip)
+        return Model(basis, mesh_from_faces(self.mesh.faces[:, ::-1]), self.camera, self.scale)
+
     def begun(self, motion: RigidMotion) -> "Model":
         """The same with its rest shape posed first as in another frame."""
         return Model(self.basis, facing(self.mesh, motion), self.camera, float(motion.s[0]))

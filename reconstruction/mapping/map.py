@@ -18,14 +18,14 @@ from reconstruction.mapping.isometric.focal import focal, under
 from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, Kind, select
+from reconstruction.mapping.solid.deformations import Deformations
 from reconstruction.mapping.solid.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES, Settings
 from reconstruction.state import State
 
-FEWEST_KEYFRAMES = 6
-FEWEST_POINTS = 20
+FEWEST_KEYFRAMES, FEWEST_POINTS = 6, 20
 LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
 ASSUMED = "focal length {:.0f} px assumed: give it if you know better"
 RIGID = 0.005  # residual over the size, up to which a solid is rigid enough to hold a focal length
@@ -45,6 +45,7 @@ class Map:
         evidence: what keyframes say for it, half against half; None before there are enough of them.
         seen: (K, p) what the keyframes show; None where it is not by keyframes.
         model: the rest shape with its modes, once they are made.
+        deformations: what is known of Λ' beforehand, of that model.
     """
 
     rest: RestShape
@@ -56,6 +57,7 @@ class Map:
     evidence: Evidence | None = None
     seen: Mask | None = None
     model: Model | None = None
+    deformations: Deformations | None = None
 
     @property
     def is_sheet(self) -> bool:
@@ -114,7 +116,9 @@ class Map:
         motion = self.rest.motion
         if (motion.R[0] @ motion.shape)[2] @ (shape[2] - shape[2].mean()) >= 0:
             return self
-        return replace(self, rest=replace(self.rest, motion=motion.mirrored()), model=None)
+        model = self.model and self.model.mirrored()
+        known = self.deformations and self.deformations.mirrored()
+        return replace(self, rest=replace(self.rest, motion=motion.mirrored()), model=model, deformations=known)
 
     def in_order(self, order: Indices) -> "Map":
         """The same, its poses in another order: the first is that of the frame where it begins."""

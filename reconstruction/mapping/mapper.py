@@ -13,6 +13,7 @@ from reconstruction.mapping.bootstrap import bootstrap
 from reconstruction.mapping.keyframes import Keyframes, difference
 from reconstruction.mapping.map import Map, map_of
 from reconstruction.mapping.solid.bundle import Bundle
+from reconstruction.mapping.solid.learned_map import with_deformations
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import FIRST_LOOKS, Settings
 
@@ -121,9 +122,11 @@ class Mapper:
         """The map of the keyframes of all frames, posed first as in the first frame; None if they do not tell."""
         if self._keyframes is None or not self._keyframes.frames:
             return None
-        W, visible, _ = self._keyframes.spread()
+        W, visible, frames = self._keyframes.spread()
         asked = camera, self._settings.estimate_focal, self._known, self.start, self._given, self._settings.kind
         found = map_of(W, visible, *asked, last=True) or self._found
+        if found is not None and found.sheet is None and found.seen is visible:
+            found = with_deformations(found, self._settings, W, visible, frames)
         return found and self._begin and nearest_first(found, *self._begin)
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:

@@ -18,6 +18,19 @@ FIRM = {"rest": 1e-2}  # of the guide: with less it now and then changes its sid
 
 
 @dataclass(frozen=True)
+class Pull:
+    """Minus twice the log likelihood of Λ', Λ'ᵀ(·)Λ' with its rows one after the other, times the images' variance.
+
+    Attributes:
+        form: (3r, 3r) the matrix of the quadratic form.
+        variance: of the images, beside whose mean squared error it stands: that of a coordinate over the number of points.
+    """
+
+    form: Array
+    variance: float
+
+
+@dataclass(frozen=True)
 class Energy:
     """Weights of the terms; each multiplies a sum of squares of dimensionless quantities (`priors` says which when).
 
@@ -36,6 +49,7 @@ class Energy:
         tied: whether the oldest frame is tied to the frame that has left the window; without, the window floats.
         edges: coarse edges of the inextensibility term.
         bending: how the rows of Λ that are not estimated follow from row τ; None: they stay at rest.
+        pull: what the deformations are known to be like; instead of a pull to rest.
         residuals: weights and residuals of the priors that are given as such.
     """
 
@@ -52,6 +66,7 @@ class Energy:
     tied: bool = True
     edges: CoarseEdges | None = None
     bending: Bending | None = None
+    pull: Pull | None = None
     residuals: tuple[tuple[float, priors.Residual], ...] = ()
 
     def about(self, centre: Array) -> "Energy":
@@ -81,6 +96,7 @@ def build_energy(
     *,
     paper: bool = False,
     linear: bool = False,
+    pull: Pull | None = None,
 ) -> Energy:
     """The energy for a constraint on the deformation (§3.4).
 
@@ -89,6 +105,7 @@ def build_energy(
         deformation: the constraint, not `auto`.
         chosen: weights of priors by name; the others keep their defaults.
         paper: the energy as printed in the paper: s = 1, a floating window.
+        pull: of `Deformations`, instead of the pull to rest and of smoothness; they were learned without.
         linear: with bending, leave rows α and β at rest as the paper does, instead of letting the sheet draw in.
     """
     weights = priors.weights(chosen or {}, deformation, perspective=model.camera.perspective, paper=paper)
@@ -96,6 +113,8 @@ def build_energy(
     # first ones, so that those are held alike however many there are.
     stiffness = model.basis.eigenvalues**-0.5
     stiffness /= np.exp(np.log(stiffness[:USUAL_MODES]).mean())
+    if pull is not None:
+        weights = weights | {"rest": 0.0, "smoothness": 0.0}
     adaptive = deformation in ("general", "stretching") and not paper and weights["smoothness"] > 0
     draws_in = deformation == "bending" and not (paper or linear)
     edges = model.coarse_edges() if draws_in or weights["inextensibility"] else None
@@ -112,6 +131,7 @@ def build_energy(
         tied=not paper,
         edges=edges if weights["inextensibility"] else None,
         bending=Bending(edges, stiffness) if draws_in and edges else None,
+        pull=pull,
         residuals=tuple((weights[n], p.residual) for n, p in priors.PRIORS.items() if p.residual and weights[n]),
     )
 

@@ -28,6 +28,9 @@ def evaluate(energy: Energy, data: Statistics, state: State, before: Previous | 
     if energy.edges is not None:
         strain = energy.edges.strain(energy.edges.vectors(state.Lambda))
         value += energy.inextensibility * (strain**2).mean(axis=1)
+    if energy.pull is not None:
+        flat = free.reshape(len(state), -1)
+        value += ((flat @ energy.pull.form) * flat).sum(axis=1)
     for weight, residual in energy.residuals:
         value += weight * (residual(state, energy.rows)[0] ** 2).sum(axis=1)
     add_smoothness_value(value, energy, state, before)
@@ -114,6 +117,9 @@ def add_rest(normal: Normal, energy: Energy, state: State) -> None:
     weights = np.broadcast_to(energy.rest, free.shape).reshape(len(state), -1)
     normal.gradient[:, POSE:] += weights * free.reshape(len(state), -1)
     diagonals(normal.diagonal)[:, POSE:] += weights
+    if energy.pull is not None:
+        normal.gradient[:, POSE:] += free.reshape(len(state), -1) @ energy.pull.form
+        normal.diagonal[:, POSE:, POSE:] += energy.pull.form
 
 
 def add_residuals(normal: Normal, energy: Energy, state: State) -> None:

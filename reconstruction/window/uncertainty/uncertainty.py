@@ -76,6 +76,8 @@ class Uncertainty:
         )
         taken = np.einsum("ij,kji->k", inverse, hessians)
         tau = np.array([variance(*one) for one in zip(values, counts, taken, strict=True)])
+        if energy.pull is not None:  # which knows the noise, and is known with it
+            tau[:] = energy.pull.variance
         spread, axes = np.linalg.eigh(inverse @ np.tensordot(tau, hessians, axes=1) @ inverse)
         moved = self._derivatives(energy, state) @ (axes * np.sqrt(spread.clip(0.0)))
         missing = left_out(state.Lambda[0] - energy.centre, state, residuals, weights, self._nearest)

@@ -17,7 +17,7 @@ LAST_MODES = 0.3  # of the modes, that tell what those left out are like
 
 def parts(energy: Energy, data: Statistics, state: State) -> tuple[Array, Array]:
     """Values (3,) and Hessians (3, d, d) of images, edges and pull to rest in a frame (n = 1), by itself."""
-    images = replace(energy, rest=0.0, edges=None, residuals=())
+    images = replace(energy, rest=0.0, edges=None, pull=None, residuals=())
     sums = [linearise(part, data, state, None) for part in (images, replace(images, edges=energy.edges), energy)]
     values, hessians = np.array([s.value[0] for s in sums]), np.stack([s.diagonal[0] for s in sums])
     return np.diff(values, prepend=0.0), np.diff(hessians, axis=0, prepend=0.0)

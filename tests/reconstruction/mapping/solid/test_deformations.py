@@ -1,0 +1,108 @@
+"""Deformations of a solid, learned from its keyframes: deeper than images alone tell, and none where there are none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis.rest_shape import RestShape
+from reconstruction.camera import Camera
+from reconstruction.evaluation import e3d
+from reconstruction.mapping.map import Map
+from reconstruction.mapping.solid.deformations import POINTS, learned
+from reconstruction.mapping.solid.learned_map import followed, with_deformations
+from reconstruction.mapping.solid.solid import bundle_adjust
+from reconstruction.settings import MOST_MODES, Settings
+from reconstruction.state import State
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
+
+K, P = 30, 150
+FRAMES = np.arange(K)
+
+
+def keyframes(deform: float, camera: Camera = PERSPECTIVE, points: int = P) -> tuple[Array, Array, Mask]:
+    """Shapes (K, 3, p) of a relief with three bumps that come and go, and its images with noise and gaps."""
+    rng = np.random.default_rng(3)
+    rest = relief(rng, points)
+    width = np.ptp(rest[0])
+    shapes = np.repeat(rest[None], K, axis=0)
+    for centre in rest[:2, rng.choice(points, 3)].T:
+        bump = np.exp(-((rest[:2] - centre[:, None]) ** 2).sum(axis=0) / (0.2 * width) ** 2)
+        way = rng.normal(size=3)
+        course = np.sin(np.arange(K) * rng.uniform(0.5, 1.5))[:, None, None]
+        shapes = shapes + deform * width * course * way[:, None] / np.linalg.norm(way) * bump
+    W, posed = seen(shapes, turns(K), camera)
+    return posed, W + 0.2 * rng.normal(size=W.shape), rng.random((K, points)) > 0.1
+
+
+def mapped(W: Array, visible: Mask, camera: Camera) -> Map:
+    solid = bundle_adjust(np.where(visible[:, None], W, np.nan), visible, camera, refine_focal=False)
+    return Map(RestShape("rigid", solid.motion, "made here"), solid.camera)
+
+
+def turned(B: Array, state: State) -> Array:
+    return state.scaled_rotations() @ (B[:3] + state.Lambda @ B[3:-1])
+
+
+@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
+def test_depth_of_deformations_is_learned(camera: Camera) -> None:
+    shapes, W, visible = keyframes(0.06, camera)
+    found = mapped(W, visible, camera)
+    model = replace(found, modes=MOST_MODES).modelled(Settings())
+    before = followed(model, Settings(), found.rest.motion, W, visible)
+    after = learned(model, W, visible, before)
+    errors = [e3d(turned(B, state), shapes).mean() for B, state in ((model.B, before), (after.B, after.state))]
+    assert errors[1] < 0.75 * errors[0]
+
+
+def test_dense_points_are_placed_by_those_they_are_learned_from() -> None:
+    shapes, W, visible = keyframes(0.06, points=POINTS + 200)
+    found = mapped(W, visible, PERSPECTIVE)
+    model = replace(found, modes=MOST_MODES).modelled(Settings())
+    before = followed(model, Settings(), found.rest.motion, W, visible)
+    after = learned(model, W, visible, before, rounds=20)
+    assert e3d(turned(after.B, after.state), shapes).mean() < 0.9 * e3d(turned(model.B, before), shapes).mean()
+
+
+def test_rigid_things_learn_nothing() -> None:
+    _, W, visible = keyframes(0.0)
+    found = mapped(W, visible, PERSPECTIVE)
+    assert with_deformations(found, Settings(), W, visible, FRAMES) is found
+
+
+@pytest.mark.parametrize(
+    "settings", [Settings(deformation="stretching"), Settings(priors={"rest": 1.0}), Settings(priors={"smoothness": 1.0})]
+)
+def test_what_was_asked_for_stays(settings: Settings) -> None:
+    _, W, visible = keyframes(0.06)
+    found = mapped(W, visible, PERSPECTIVE)
+    assert with_deformations(found, settings, W, visible, FRAMES) is found
+
+
+def test_keyframes_stay_in_the_order_of_the_map() -> None:
+    _, W, visible = keyframes(0.06)
+    order = np.random.default_rng(5).permutation(K)
+    found = mapped(W[order], visible[order], PERSPECTIVE)
+    known = with_deformations(found, Settings(), W[order], visible[order], FRAMES[order])
+    assert known.deformations is not None
+    turn = known.rest.motion.R @ known.rest.motion.R[0].T @ found.rest.motion.R[0] @ found.rest.motion.R.swapaxes(1, 2)
+    assert np.degrees(np.arccos((np.trace(turn, axis1=1, axis2=2).clip(-1, 3) - 1) / 2)).max() < 10
+
+
+def test_the_mirror_image_has_the_mirrored_deformations() -> None:
+    _, W, visible = keyframes(0.06, ORTHOGRAPHIC)
+    known = with_deformations(mapped(W, visible, ORTHOGRAPHIC), Settings(), W, visible, FRAMES)
+    assert known.model is not None
+    assert known.deformations is not None
+    flip = np.array([1.0, 1.0, -1.0])[:, None]
+    motion = known.rest.motion
+    other = known.turned_like(flip * (motion.R[0] @ motion.shape))
+    assert other.model is not None
+    assert other.deformations is not None
+    Lambda = np.random.default_rng(0).normal(size=(3, len(known.model.basis.eigenvalues)))
+    mirrored = flip * Lambda
+    assert other.model.basis.deform(mirrored) == pytest.approx(flip * known.model.basis.deform(Lambda))
+    pulls = [one.pull(P).form for one in (known.deformations, other.deformations)]
+    costs = [row.ravel() @ form @ row.ravel() for row, form in zip((Lambda, mirrored), pulls, strict=True)]
+    assert costs[0] == pytest.approx(costs[1])
