@@ -4,11 +4,12 @@ Inside, lengths are over the rest shape's RMS radius, and image points over the 
 whatever the units of the two are.
 """
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
 
-from reconstruction.arrays import Array, Mask
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.constraints import CoarseEdges
 from reconstruction.basis.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges, without_strays
 from reconstruction.basis.modal_basis import ModalBasis, principal_axes
@@ -52,6 +53,14 @@ class Model:
     def scaled(self, factor: float) -> "Model":
         """The same in other units of the rest shape: so many times as many, each so much smaller."""
         return Model(replace(self.basis, rest=factor * self.basis.rest), self.mesh, self.camera, self.scale / factor)
+
+    def of_points(self, some: Indices) -> "Model":
+        """The same for some of the points only: poses and Λ' are those of all."""
+        few = copy(self)
+        gain = float(np.sqrt(self.B.shape[1] / len(some)))
+        rest, Upsilon = self.basis.rest[:, some], gain * self.basis.Upsilon[:, some]
+        few.basis, few.B = replace(self.basis, rest=rest, Upsilon=Upsilon), self.B[:, some]
+        return few
 
     def mirrored(self) -> "Model":
         """The same with its depth reversed; of Λ', row τ, too."""

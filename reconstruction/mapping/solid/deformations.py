@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 
-from reconstruction.arrays import Array, Mask
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.constraints import ALL_ROWS
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.basis.model import Model
@@ -83,7 +83,7 @@ def learned(model: Model, W: Array, visible: Mask, state: State, rounds: int = R
         rounds: of expectation and maximisation.
     """
     K, B, focal = len(state), model.B.copy(), model.focal
-    some = np.sort(farthest_points(B[:3].T, POINTS)) if B.shape[1] > POINTS else np.arange(B.shape[1])
+    some = well_spread(model)
     seen = np.stack([model.normalised(one) for one in W])
     noise = deviation_of(lengths(images_off(B[:, some], seen[:, :, some], state, focal))[visible[:, some]])
     log_s = state.log_s
@@ -108,6 +108,12 @@ def learned(model: Model, W: Array, visible: Mask, state: State, rounds: int = R
         off = images_off(B, seen, state, focal)
         B[:3] += shifts(seen, off, weights(off, visible, noise), state, focal)
     return Learned(B, state, Deformations(covariance, noise))
+
+
+def well_spread(model: Model) -> Indices:
+    """The points by which is learned, ascending."""
+    p = model.B.shape[1]
+    return np.sort(farthest_points(model.B[:3].T, POINTS)) if p > POINTS else np.arange(p)
 
 
 def about_mean(state: State, B: Array) -> tuple[State, Array]:

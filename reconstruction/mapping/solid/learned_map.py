@@ -10,7 +10,7 @@ from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import rotation_from_quaternion
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.bundle import Bundle
-from reconstruction.mapping.solid.deformations import Learned, images_off, learned
+from reconstruction.mapping.solid.deformations import Learned, images_off, learned, well_spread
 from reconstruction.settings import MOST_MODES, Settings
 from reconstruction.state import State, join
 from reconstruction.window.energy import build_energy
@@ -39,9 +39,12 @@ def with_deformations(found: Map, settings: Settings, W: Array, visible: Mask, f
     W, visible = np.where(visible[:, None], W, 0.0)[order], visible[order]
     motion = found.rest.motion.in_order(order)
     model = replace(found, modes=MOST_MODES, model=None).modelled(settings)
-    state = followed(model, settings, motion, W, visible)
-    rigid = Bundle(motion, 1 / found.camera.focal_px).image() + found.camera.center_px[:, None] - W
-    if not predicted(model, W, visible, state, lengths(rigid)):
+    some = well_spread(model)
+    few, part = model.of_points(some), (W[:, :, some], visible[:, some])
+    motion = replace(motion, shape=motion.shape[:, some])
+    state = followed(few, settings, motion, *part)
+    rigid = Bundle(motion, 1 / found.camera.focal_px).image() + found.camera.center_px[:, None] - part[0]
+    if not predicted(few, *part, state, lengths(rigid)):
         return found
     return about(found, model, learned(model, W, visible, state), np.argsort(order))
 

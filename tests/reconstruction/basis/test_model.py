@@ -111,3 +111,14 @@ def test_a_shape_has_a_state_only_before_the_camera(rng: np.random.Generator) ->
     assert found is not None
     assert np.isfinite(found.log_s).all()
     assert model.state_of(-shape, PERSPECTIVE, seen, None) is None
+
+
+@given(SEEDS, CAMERAS)
+def test_some_of_the_points_have_the_poses_and_coefficients_of_all(rng: np.random.Generator, camera: Camera) -> None:
+    model, state = model_of(relief(rng, POINTS), camera, MODES), near_state(rng)
+    some = np.sort(rng.choice(POINTS, POINTS // 2, replace=False))
+    few, visible = model.of_points(some), np.ones(POINTS, bool)
+    whole = model.estimate(0, np.zeros((2, POINTS)), visible, state, row=0)
+    part = few.estimate(0, np.zeros((2, len(some))), visible[some], state, row=0)
+    np.testing.assert_allclose(part.shape, whole.shape[:, some], atol=1e-8)
+    np.testing.assert_allclose(few.projection(state, 0), model.projection(state, 0)[:, some], atol=1e-8)
