@@ -42,11 +42,14 @@ def with_deformations(found: Map, settings: Settings, W: Array, visible: Mask, f
     some = well_spread(model)
     few, part = model.of_points(some), (W[:, :, some], visible[:, some])
     motion = replace(motion, shape=motion.shape[:, some])
-    state = followed(few, settings, motion, *part)
-    rigid = Bundle(motion, 1 / found.camera.focal_px).image() + found.camera.center_px[:, None] - part[0]
-    if not predicted(few, *part, state, lengths(rigid)):
+    try:
+        state = followed(few, settings, motion, *part)
+        rigid = Bundle(motion, 1 / found.camera.focal_px).image() + found.camera.center_px[:, None] - part[0]
+        if not predicted(few, *part, state, lengths(rigid)):
+            return found
+        return about(found, model, learned(model, W, visible, state), np.argsort(order))
+    except np.linalg.LinAlgError:  # of points that lie as none do
         return found
-    return about(found, model, learned(model, W, visible, state), np.argsort(order))
 
 
 def followed(model: Model, settings: Settings, motion: RigidMotion, W: Array, visible: Mask) -> State:

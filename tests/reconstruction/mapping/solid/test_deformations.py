@@ -10,7 +10,8 @@ from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.solid.deformations import POINTS, learned
+from reconstruction.mapping.solid import learned_map
+from reconstruction.mapping.solid.deformations import POINTS, inverted, learned
 from reconstruction.mapping.solid.learned_map import followed, with_deformations
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import MOST_MODES, Settings
@@ -106,3 +107,14 @@ def test_the_mirror_image_has_the_mirrored_deformations() -> None:
     pulls = [one.pull(P).form for one in (known.deformations, other.deformations)]
     costs = [row.ravel() @ form @ row.ravel() for row, form in zip((Lambda, mirrored), pulls, strict=True)]
     assert costs[0] == pytest.approx(costs[1])
+
+
+def test_points_that_no_gaussian_holds_leave_the_map_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    _, W, visible = keyframes(0.06)
+    found = mapped(W, visible, PERSPECTIVE)
+
+    def fails(*_: object) -> None:
+        inverted(-np.eye(2))
+
+    monkeypatch.setattr(learned_map, "learned", fails)
+    assert with_deformations(found, Settings(), W, visible, FRAMES) is found
