@@ -55,7 +55,7 @@ class Model:
         return Model(replace(self.basis, rest=factor * self.basis.rest), self.mesh, self.camera, self.scale / factor)
 
     def of_points(self, some: Indices) -> "Model":
-        """The same for some of the points only: poses and Λ' are those of all."""
+        """The same for some of the points only, without a mesh of their own: poses and Λ' are those of all."""
         few = copy(self)
         gain = float(np.sqrt(self.B.shape[1] / len(some)))
         rest, Upsilon = self.basis.rest[:, some], gain * self.basis.Upsilon[:, some]
@@ -66,7 +66,7 @@ class Model:
         """The same with its depth reversed; of Λ', row τ, too."""
         flip = np.diag([1.0, 1.0, -1.0])
         basis = replace(self.basis, rest=flip @ self.basis.rest, Phi=flip @ self.basis.Phi @ flip)
-        return Model(basis, mesh_from_faces(self.mesh.faces[:, ::-1]), self.camera, self.scale)
+        return Model(basis, self.mesh, self.camera, self.scale)
 
     def begun(self, motion: RigidMotion) -> "Model":
         """The same with its rest shape posed first as in another frame."""
@@ -78,7 +78,7 @@ class Model:
         return self.radius * float(np.sqrt(self.B.shape[1]))
 
     def normalised(self, W: Array) -> Array:
-        """Image points (2, p) px as the solver wants them."""
+        """Image points (..., 2, p) px as the solver wants them."""
         return (W - self.camera.center_px[:, None]) / self.radius_px
 
     def projection(self, state: State, frame: int = -1) -> Array:

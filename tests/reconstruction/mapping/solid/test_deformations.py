@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from reconstruction.arrays import Array, Mask
+from reconstruction.basis.model import facing
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
@@ -107,6 +108,7 @@ def test_the_mirror_image_has_the_mirrored_deformations() -> None:
     pulls = [one.pull(P).form for one in (known.deformations, other.deformations)]
     costs = [row.ravel() @ form @ row.ravel() for row, form in zip((Lambda, mirrored), pulls, strict=True)]
     assert costs[0] == pytest.approx(costs[1])
+    np.testing.assert_array_equal(other.model.mesh.faces, facing(known.model.mesh, other.rest.motion).faces)
 
 
 def test_points_that_no_gaussian_holds_leave_the_map_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
