@@ -207,7 +207,7 @@ def solid_map(
     if estimate_focal and np.nanmedian(found.residual_px) > RIGID * rms_radius(found.shape):
         found = bundle_adjust(W, visible, camera, refine_focal=False, known=known)
     rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
-    modes = modes_held(W, visible, found, camera, MOST_MODES if last else MORE_MODES)
+    modes = modes_held(W, visible, found, MOST_MODES if last else MORE_MODES)
     return Map(rest, found.camera, modes=modes, evidence=evidence)
 
 

@@ -12,7 +12,7 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.bootstrap import bootstrap
 from reconstruction.mapping.keyframes import Keyframes, difference
 from reconstruction.mapping.map import Map, map_of
-from reconstruction.mapping.solid.bundle import Bundle
+from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.learned_map import with_deformations
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import FIRST_LOOKS, Settings
@@ -124,9 +124,10 @@ class Mapper:
             return None
         W, visible, frames = self._keyframes.spread()
         asked = camera, self._settings.estimate_focal, self._known, self.start, self._given, self._settings.kind
-        found = map_of(W, visible, *asked, last=True) or self._found
-        if found is not None and found.sheet is None and found.seen is visible:
+        found = map_of(W, visible, *asked, last=True)
+        if found is not None and found.sheet is None:
             found = with_deformations(found, self._settings, W, visible, frames)
+        found = found or self._found
         return found and self._begin and nearest_first(found, *self._begin)
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
@@ -188,8 +189,7 @@ def stacked(frames: list[tuple[Array, Mask]]) -> tuple[Array, Mask]:
 
 def nearest_first(found: Map, W: Array, visible: Mask) -> Map:
     """A map with that pose first in which its rest shape looks most like an image (2, p) px, visible (p,)."""
-    camera, motion = found.camera, found.rest.motion
-    image = Bundle(motion, 1 / camera.focal_px).image() + camera.center_px[:, None]
+    image = seen_by(found.camera, found.rest.motion)
     every = np.ones((len(image), W.shape[1]), np.bool_)
     order = np.argsort(difference(np.where(visible, W, 0.0), visible, image, every), kind="stable")
     return found.in_order(order)

@@ -105,8 +105,8 @@ def build_energy(
         deformation: the constraint, not `auto`.
         chosen: weights of priors by name; the others keep their defaults.
         paper: the energy as printed in the paper: s = 1, a floating window.
-        pull: of `Deformations`, instead of the pull to rest and of smoothness; they were learned without.
         linear: with bending, leave rows α and β at rest as the paper does, instead of letting the sheet draw in.
+        pull: of `Deformations`, instead of the pull to rest and of smoothness; they were learned without.
     """
     weights = priors.weights(chosen or {}, deformation, perspective=model.camera.perspective, paper=paper)
     # A mode's eigenvalue says how much of the shape's extent it carries: weak modes are pulled to rest harder. By the

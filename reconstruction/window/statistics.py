@@ -144,6 +144,6 @@ def value(statistics: Statistics, M: Array) -> Array:
 
 
 def residuals(basis: Array, W: Array, M: Array, focal: float) -> Array:
-    """ρ (2, p) of one frame, point by point: what `value` sums up."""
+    """ρ (..., 2, p) of points W (..., 2, p) by M (..., 3, K), point by point: what `value` sums up."""
     seen = M @ basis
-    return W - seen[:2] + W / focal * seen[2]
+    return np.asarray(W - seen[..., :2, :] + W / focal * seen[..., 2:, :])

@@ -15,7 +15,7 @@ import numpy as np
 
 from reconstruction.arrays import Array, Indices
 from reconstruction.basis.rest_shape import RigidMotion
-from reconstruction.camera import quaternion_exp, rotation_from_quaternion
+from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
 
 POSE = 6  # θ, t, log s of a view
 HALF_WIDTH = 0.5  # relief over width that is as deep as is believed without proof
@@ -71,6 +71,11 @@ class Bundle:
     def __getitem__(self, views: Indices) -> "Bundle":
         m = self.motion
         return Bundle(RigidMotion(m.shape, m.R[views], m.s[views], m.t[views]), self.kappa)
+
+
+def seen_by(camera: Camera, motion: RigidMotion) -> Array:
+    """Image (K, 2, p) px of a rigid shape in its poses."""
+    return Bundle(motion, 1 / camera.focal_px).image() + camera.center_px[:, None]
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotri
 
-from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.arrays import Array, Mask
 from reconstruction.basis.constraints import ALL_ROWS
-from reconstruction.basis.mesh import farthest_points
 from reconstruction.basis.model import Model
+from reconstruction.mapping.solid.bundle import Loss
+from reconstruction.mapping.solid.placing import well_spread
+from reconstruction.mapping.solid.solid import TAIL_SIGMAS
 from reconstruction.state import POSE, State
 from reconstruction.window.energy import Pull
-from reconstruction.window.robust import RAYLEIGH_MEDIAN, lengths
+from reconstruction.window.robust import deviation, lengths
 from reconstruction.window.statistics import Statistics, frame_statistics, residuals, stack
 from reconstruction.window.terms import data_normal
 
@@ -29,7 +31,6 @@ ROUNDS = 40  # depth comes to light slowly, and in ever more rounds what is nois
 POINTS = 400  # by which it is learned: dense ones are placed afterwards
 BELIEVED = 2.0  # keyframes' worth of a Gaussian in which only the modes differ, by their eigenvalues
 SCALE = 0.02  # deviation of log s from where it was at first: what comes nearer may as well swell
-TAIL_SIGMAS = 3.0  # of the residuals, where the loss leaves the parabola
 LEAST_NOISE = 5e-3  # of the size: neighbours' errors are alike, and what is believed of them goes into depth
 LOOSE = 1e-3  # pull of a point of the rest shape to where it was, of what images say about it
 
@@ -83,19 +84,20 @@ def learned(model: Model, W: Array, visible: Mask, state: State, rounds: int = R
         rounds: of expectation and maximisation.
     """
     K, B, focal = len(state), model.B.copy(), model.focal
-    some = well_spread(model)
-    seen = np.stack([model.normalised(one) for one in W])
-    noise = deviation_of(lengths(images_off(B[:, some], seen[:, :, some], state, focal))[visible[:, some]])
-    log_s = state.log_s
+    some = well_spread(B[:3], visible, POINTS)
+    seen, log_s = model.normalised(W), state.log_s
+    off = residuals(B[:, some], seen[:, :, some], state.matrices(), focal)
+    noise = deviation(lengths(off)[visible[:, some]], LEAST_NOISE)
     alike = np.tile(model.basis.eigenvalues**0.5, 3)
     believed = np.diag(alike / alike.sum())
     unsure, taken = np.zeros_like(believed), 0.0  # covariance of Λ', and parameters that the images hold; both of a frame
     for _ in range(rounds):
         state, B = about_mean(state, B)
-        off = images_off(B[:, some], seen[:, :, some], state, focal)
-        h = weights(off, visible[:, some], noise)
-        squares = (h * (off**2).sum(axis=1)).sum() + K * taken * noise**2
-        noise = max(float(np.sqrt(squares / (2 * h.sum()))), LEAST_NOISE)
+        off = residuals(B[:, some], seen[:, :, some], state.matrices(), focal)
+        squares = (off**2).sum(axis=1)
+        h = visible[:, some] * robust(noise).weight(squares)
+        total = (h * squares).sum() + K * taken * noise**2
+        noise = max(float(np.sqrt(total / (2 * h.sum()))), LEAST_NOISE)
         B[:3, some] += shifts(seen[:, :, some], off, h, state, focal)
         Lambda = state.Lambda.reshape(K, -1)
         moments = Lambda.T @ Lambda / K + unsure
@@ -105,15 +107,15 @@ def learned(model: Model, W: Array, visible: Mask, state: State, rounds: int = R
         state, unsure, taken = expected(data, state, inverted(covariance), noise**2 / len(some), log_s)
     state, B = about_mean(state, B)
     if len(some) < B.shape[1]:
-        off = images_off(B, seen, state, focal)
-        B[:3] += shifts(seen, off, weights(off, visible, noise), state, focal)
+        off = residuals(B, seen, state.matrices(), focal)
+        h = visible * robust(noise).weight((off**2).sum(axis=1))
+        B[:3] += shifts(seen, off, h, state, focal)
     return Learned(B, state, Deformations(covariance, noise))
 
 
-def well_spread(model: Model) -> Indices:
-    """The points by which is learned, ascending."""
-    p = model.B.shape[1]
-    return np.sort(farthest_points(model.B[:3].T, POINTS)) if p > POINTS else np.arange(p)
+def robust(noise: float) -> Loss:
+    """The loss of residuals with that deviation."""
+    return Loss(TAIL_SIGMAS * noise, redescending=True)
 
 
 def about_mean(state: State, B: Array) -> tuple[State, Array]:
@@ -121,21 +123,6 @@ def about_mean(state: State, B: Array) -> tuple[State, Array]:
     mean = state.Lambda.mean(axis=0)
     moved = np.concatenate([B[:3] + mean @ B[3:-1], B[3:]])
     return replace(state, Lambda=state.Lambda - mean), moved
-
-
-def images_off(B: Array, seen: Array, state: State, focal: float) -> Array:
-    """Residuals ρ (K, 2, p) of points seen (K, 2, p), in units of the shape's size."""
-    return np.stack([residuals(B, one, M, focal) for one, M in zip(seen, state.matrices(), strict=True)])
-
-
-def deviation_of(distances: Array) -> float:
-    """Deviation of a coordinate of vectors of these lengths, from their median; never less than tracks are off by."""
-    return max(float(np.median(distances)) / RAYLEIGH_MEDIAN, LEAST_NOISE)
-
-
-def weights(off: Array, visible: Mask, noise: float) -> Array:
-    """Geman and McClure's weights (K, p) of residuals (K, 2, p) with that deviation, 0 where not visible (K, p)."""
-    return np.asarray(visible / (1 + (off**2).sum(axis=1) / (TAIL_SIGMAS * noise) ** 2) ** 2)
 
 
 def expected(data: Statistics, state: State, precision: Array, variance: float, log_s: Array) -> tuple[State, Array, float]:

@@ -9,9 +9,8 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis.mesh import triangulate
 from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.modes import modal_basis
-from reconstruction.camera import Camera
 from reconstruction.mapping.keyframes import KEYFRAMES, thinned
-from reconstruction.mapping.solid.bundle import Bundle
+from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.solid import Solid
 from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES
 
@@ -19,7 +18,7 @@ COMPARED = 0.8  # of the points: no more modes can be compared
 BETTER = 0.97  # times what half as many modes leave over: less than that is worth the time of more
 
 
-def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera, most: int = MOST_MODES) -> int:
+def modes_held(W: Array, visible: Mask, solid: Solid, most: int = MOST_MODES) -> int:
     """Number of modes for a solid.
 
     What its rigid shape leaves over in each keyframe is fitted by the modes; by generalised cross validation, more of them
@@ -31,7 +30,6 @@ def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera, most: int 
         W: (K, 2, p) px; anything where not visible.
         visible: (K, p).
         solid: the rigid shape posed in the keyframes.
-        camera: as it was made for.
         most: that there is time for.
     """
     some = thinned(W.shape[2])
@@ -45,7 +43,7 @@ def modes_held(W: Array, visible: Mask, solid: Solid, camera: Camera, most: int 
     mesh = triangulate((principal_axes(shape).T @ shape)[:2].T)
     modes = modal_basis(shape, mesh, counts[-1], "jensen-shannon").Upsilon
     functions = np.concatenate([np.full((1, p), p**-0.5), modes])
-    left = W - camera.center_px[:, None] - Bundle(motion, 1 / solid.camera.focal_px).image()
+    left = W - seen_by(solid.camera, motion)
     by = [left_over(left, visible, functions[: count + 1]) for count in counts]
     better = [twice < BETTER * once for once, twice in pairwise(by)]
     return held[[*better, False].index(False)]

@@ -9,12 +9,14 @@ from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import rotation_from_quaternion
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.solid.bundle import Bundle
-from reconstruction.mapping.solid.deformations import Learned, images_off, learned, well_spread
+from reconstruction.mapping.solid.bundle import seen_by
+from reconstruction.mapping.solid.deformations import POINTS, Learned, learned
+from reconstruction.mapping.solid.placing import well_spread
 from reconstruction.settings import MOST_MODES, Settings
 from reconstruction.state import State, join
 from reconstruction.window.energy import build_energy
 from reconstruction.window.robust import lengths
+from reconstruction.window.statistics import residuals
 from reconstruction.window.window import SlidingWindow
 
 HIDDEN = 0.15  # of what keyframes show, to see whether it is predicted
@@ -39,12 +41,12 @@ def with_deformations(found: Map, settings: Settings, W: Array, visible: Mask, f
     W, visible = np.where(visible[:, None], W, 0.0)[order], visible[order]
     motion = found.rest.motion.in_order(order)
     model = replace(found, modes=MOST_MODES, model=None).modelled(settings)
-    some = well_spread(model)
+    some = well_spread(model.B[:3], visible, POINTS)
     few, part = model.of_points(some), (W[:, :, some], visible[:, some])
     motion = replace(motion, shape=motion.shape[:, some])
     try:
         state = followed(few, settings, motion, *part)
-        rigid = Bundle(motion, 1 / found.camera.focal_px).image() + found.camera.center_px[:, None] - part[0]
+        rigid = seen_by(found.camera, motion) - part[0]
         if not predicted(few, *part, state, lengths(rigid)):
             return found
         return about(found, model, learned(model, W, visible, state), np.argsort(order))
@@ -69,8 +71,7 @@ def predicted(model: Model, W: Array, visible: Mask, state: State, rigid_px: Arr
     if not hidden.any():
         return False
     found = learned(model, W, visible & ~hidden, state, TRIAL)
-    seen = np.stack([model.normalised(one) for one in W])
-    off = lengths(images_off(found.B, seen, found.state, model.focal)) * model.radius_px
+    off = lengths(residuals(found.B, model.normalised(W), found.state.matrices(), model.focal)) * model.radius_px
     return bool(np.quantile(off[hidden], COMPARED) < BETTER * np.quantile(rigid_px[hidden], COMPARED))
 
 

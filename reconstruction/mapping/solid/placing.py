@@ -12,12 +12,12 @@ MOST_POINTS = 1000  # are adjusted together with the poses; of dense ones the ot
 DOME = 0.4  # height of the shape it starts from, over its RMS radius
 
 
-def well_spread(first: Array, visible: Mask) -> Indices:
-    """Those of points (2, p) with visibility (K, p) that are adjusted together, ascending."""
+def well_spread(places: Array, visible: Mask, most: int = MOST_POINTS) -> Indices:
+    """Those of points (2 or 3, p) with visibility (K, p) that are adjusted together, ascending."""
     often = np.flatnonzero(visible.sum(axis=0) >= FEWEST_VIEWS)
-    if first.shape[1] <= MOST_POINTS:
-        return np.arange(first.shape[1])
-    return np.sort(often[farthest_points(first[:, often].T, MOST_POINTS)])
+    if places.shape[1] <= most:
+        return np.arange(places.shape[1])
+    return np.sort(often[farthest_points(places[:, often].T, most)])
 
 
 def dome(first: Array, bulge: float, kappa: float) -> RigidMotion:

@@ -12,7 +12,7 @@ covariance
 
 Neighbours' residuals are alike, since most of them is what the modes leave out: n_k is the number of residuals over the
 variance of their sums in small patches, in units of that of independent ones. What the modes leave out is missing from the
-vertices, too (`variances.left_out`).
+vertices, too (`variances.left_out`). Where deformations are known (`energy.Pull`), τ_k is the noise they were learned with.
 
 Neighbouring frames count for nothing, since their errors are alike, too. The rest shape is taken as exact, and so is the
 side to which it bends: before an orthographic camera the mirror image may be the truth.
@@ -69,15 +69,16 @@ class Uncertainty:
         values, hessians = parts(energy, data, state)
         ridge = RIDGE * np.trace(hessians.sum(axis=0)) / hessians.shape[1]
         inverse = np.linalg.inv(hessians.sum(axis=0) + ridge * np.eye(hessians.shape[1]))
-        counts = (
-            2 * weights.sum() / alike(weights * residuals, self._patch),
-            self._independent_edges(energy, state),
-            len(energy.rows) * self._modes,
-        )
-        taken = np.einsum("ij,kji->k", inverse, hessians)
-        tau = np.array([variance(*one) for one in zip(values, counts, taken, strict=True)])
-        if energy.pull is not None:  # which knows the noise, and is known with it
-            tau[:] = energy.pull.variance
+        if energy.pull is None:
+            counts = (
+                2 * weights.sum() / alike(weights * residuals, self._patch),
+                self._independent_edges(energy, state),
+                len(energy.rows) * self._modes,
+            )
+            taken = np.einsum("ij,kji->k", inverse, hessians)
+            tau = np.array([variance(*one) for one in zip(values, counts, taken, strict=True)])
+        else:
+            tau = np.full(len(hessians), energy.pull.variance)
         spread, axes = np.linalg.eigh(inverse @ np.tensordot(tau, hessians, axes=1) @ inverse)
         moved = self._derivatives(energy, state) @ (axes * np.sqrt(spread.clip(0.0)))
         missing = left_out(state.Lambda[0] - energy.centre, state, residuals, weights, self._nearest)

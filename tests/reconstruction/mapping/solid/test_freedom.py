@@ -26,7 +26,7 @@ def test_as_many_modes_as_the_keyframes_show(points: int, deforms: bool, modes: 
     W = W + 0.2 * rng.normal(size=W.shape)
     visible = rng.random((K, points)) > 0.1
     solid = bundle_adjust(W, visible, PERSPECTIVE, refine_focal=False)
-    assert modes_held(np.where(visible[:, None], W, np.nan), visible, solid, PERSPECTIVE) == modes
+    assert modes_held(np.where(visible[:, None], W, np.nan), visible, solid) == modes
 
 
 def test_few_keyframes_have_few_modes() -> None:
@@ -35,11 +35,11 @@ def test_few_keyframes_have_few_modes() -> None:
     W, _ = seen(shapes, turns(K - 1), PERSPECTIVE)
     visible = np.ones((K - 1, P), bool)
     solid = bundle_adjust(W, visible, PERSPECTIVE, refine_focal=False)
-    assert modes_held(W, visible, solid, PERSPECTIVE) == USUAL_MODES
+    assert modes_held(W, visible, solid) == USUAL_MODES
 
 
 def test_few_points_have_few_modes() -> None:
     rng = np.random.default_rng(3)
     W, _ = seen(np.repeat(relief(rng, 20)[None], K, axis=0), turns(K), PERSPECTIVE)
     solid = bundle_adjust(W, np.ones((K, 20), bool), PERSPECTIVE, refine_focal=False)
-    assert modes_held(W, np.ones((K, 20), bool), solid, PERSPECTIVE) == USUAL_MODES
+    assert modes_held(W, np.ones((K, 20), bool), solid) == USUAL_MODES
