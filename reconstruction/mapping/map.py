@@ -18,8 +18,8 @@ from reconstruction.mapping.isometric.focal import focal, under
 from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, Kind, select
-from reconstruction.mapping.solid.deformations import Deformations
-from reconstruction.mapping.solid.freedom import modes_held
+from reconstruction.mapping.solid.deforming.deformations import Deformations
+from reconstruction.mapping.solid.deforming.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES, Settings

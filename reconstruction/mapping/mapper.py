@@ -13,7 +13,7 @@ from reconstruction.mapping.bootstrap import bootstrap
 from reconstruction.mapping.keyframes import Keyframes, difference
 from reconstruction.mapping.map import Map, map_of
 from reconstruction.mapping.solid.bundle import seen_by
-from reconstruction.mapping.solid.learned_map import with_deformations
+from reconstruction.mapping.solid.deforming.learned_map import with_deformations
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import FIRST_LOOKS, Settings
 

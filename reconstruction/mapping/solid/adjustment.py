@@ -9,10 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from reconstruction.arrays import Array
-from reconstruction.mapping.solid.bundle import POSE, Bundle, Derivatives, Loss, Prior, off_plane
+from reconstruction.mapping.solid.bundle import NEAREST, POSE, Bundle, Derivatives, Loss, Prior, off_plane
 from reconstruction.mapping.solid.factors import Factors
 
-NEAREST = 0.1  # a point's depth over its view's, closer than which no point may come to the camera
 GIVING_UP = 1e6  # damping at which no step helps any more
 FIXED = [0, 1, 2, 5]  # of the first view: its turn and scale are the shape's axes and unit
 
@@ -65,9 +64,9 @@ def adjust(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior, how: Ad
 
 
 def energy(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior) -> float:
-    """What `adjust` minimises; infinite with a point too close to the camera, or a step beyond all numbers."""
+    """What `adjust` minimises; infinite with a point seen too close to the camera, or a step beyond all numbers."""
     Y = bundle.placed()
-    if not np.isfinite(Y).all() or bundle.kappa * Y[:, 2].min() < NEAREST - 1:
+    if not np.isfinite(Y).all() or bundle.kappa * np.where(h > 0, Y[:, 2], 0.0).min() < NEAREST - 1:
         return float("inf")
     return float((h * loss.value(((bundle.image(Y) - W) ** 2).sum(axis=1))).sum()) + prior.value(bundle)
 

@@ -18,6 +18,7 @@ from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
 
 POSE = 6  # θ, t, log s of a view
+NEAREST = 0.1  # a point's depth over its view's, closer than which no point that is seen may come to the camera
 HALF_WIDTH = 0.5  # relief over width that is as deep as is believed without proof
 PROOF = 0.01  # share of the residuals that twice that relief must explain
 LOOSE = 0.3  # of one observation, says that a point is no deeper
@@ -45,7 +46,15 @@ class Bundle:
     def image(self, placed: Array | None = None) -> Array:
         """Points u (K, 2, p) relative to the principal point."""
         Y = self.placed() if placed is None else placed
-        return np.asarray((Y[:, :2] + self.motion.t[:, :, None]) / (1 + self.kappa * Y[:, 2:]))
+        return np.asarray((Y[:, :2] + self.motion.t[:, :, None]) / self.farness(Y)[:, None])
+
+    def farness(self, placed: Array) -> Array:
+        """Depths (K, p) of points Y (K, 3, p) over their views', at least `NEAREST`: less where nothing is seen alone."""
+        return np.maximum(1 + self.kappa * placed[:, 2], NEAREST)
+
+    def reversed(self) -> "Bundle":
+        """The same with its depth reversed, which explains distant views as well."""
+        return Bundle(self.motion.mirrored(), self.kappa)
 
     def centred(self) -> "Bundle":
         """The same about the shape's middle, as large as in the first view: nothing of the images changes.
@@ -193,7 +202,7 @@ class Derivatives:
 
     @cached_property
     def _nearness(self) -> Array:
-        return np.asarray(1 / (1 + self.bundle.kappa * self._placed[:, 2]))
+        return np.asarray(1 / self.bundle.farness(self._placed))
 
     @cached_property
     def _slope(self) -> Array:

@@ -1,5 +1,7 @@
 """Which points of a solid are adjusted together, the shapes that this starts from, and where the other points are."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from reconstruction.arrays import Array, Indices, Mask
@@ -10,6 +12,9 @@ from reconstruction.mapping.solid.bundle import Bundle
 FEWEST_VIEWS, FEWEST_POINTS = 3, 6
 MOST_POINTS = 1000  # are adjusted together with the poses; of dense ones the others are placed afterwards
 DOME = 0.4  # height of the shape it starts from, over its RMS radius
+FLAT_DOME = 1e-3  # of that, for a plane
+FAR = 4.0  # usual distances from the middle, beyond which a place by linear least squares is not believed
+NEAR = 0.3  # a point's depth over its view's, nearer than which it is not believed either
 
 
 def well_spread(places: Array, visible: Mask, most: int = MOST_POINTS) -> Indices:
@@ -20,12 +25,12 @@ def well_spread(places: Array, visible: Mask, most: int = MOST_POINTS) -> Indice
     return np.sort(often[farthest_points(places[:, often].T, most)])
 
 
-def dome(first: Array, bulge: float, kappa: float) -> RigidMotion:
-    """A shallow dome (3, p) that looks as the image (2, p), bulging from (+1) or to (-1) the camera."""
+def dome(first: Array, kappa: float, *, flat: bool) -> RigidMotion:
+    """A shallow dome (3, p), or hardly one, that looks as the image (2, p), bulging from the camera."""
     middle = first.mean(axis=1)
     squares = ((first - middle[:, None]) ** 2).sum(axis=0)
-    z = bulge * DOME * (squares.mean() - squares) / np.quantile(squares, 0.9)
-    z = np.clip(z, -DOME, DOME)
+    z = DOME * (squares.mean() - squares) / np.quantile(squares, 0.9)
+    z = (FLAT_DOME if flat else 1.0) * np.clip(z, -DOME, DOME)
     xy = first * (1 + kappa * z)
     t = xy.mean(axis=1)
     return RigidMotion(np.concatenate([xy - t[:, None], z[None]]), np.eye(3)[None], np.ones(1), t[None])
@@ -55,3 +60,25 @@ def placed_by(W: Array, h: Array, bundle: Bundle) -> Array:
     middle = m.shape.mean(axis=1)
     loose = 1e-6 * normal.max(initial=1e-300) * np.eye(3)
     return np.asarray(np.linalg.solve(normal + loose, (right + loose @ middle)[:, :, None])[:, :, 0].T)
+
+
+def located(W: Array, h: Array, bundle: Bundle, points: Mask) -> Bundle:
+    """A bundle in which points (p,) are where its views (K, 2, p) with weights (K, p) see them, others stay.
+
+    Where two views or more do not place them well they are as far away as the shape's middle in the first that sees them.
+    """
+    m = bundle.motion
+    seen = h[:, points] > 0
+    middle = np.median(m.shape[:, ~points], axis=1, keepdims=True)
+    usual = np.sqrt(np.median(((m.shape[:, ~points] - middle) ** 2).sum(axis=0)))
+    view = seen.argmax(axis=0)
+    deep = (m.s * (m.R @ middle)[:, 2, 0])[view]
+    beside = W[view, :, np.flatnonzero(points)] * (1 + bundle.kappa * deep)[:, None] - m.t[view]
+    rough = np.einsum("pba,pb->ap", m.R[view], np.column_stack([beside, deep])) / m.s[view]
+    place = placed_by(W[:, :, points], h[:, points], bundle)
+    nearness = 1 + bundle.kappa * np.einsum("ka,ap->kp", m.s[:, None] * m.R[:, 2], place)
+    good = (seen.sum(axis=0) > 1) & (np.linalg.norm(place - middle, axis=0) < FAR * usual)
+    good &= np.where(seen, nearness, 1.0).min(axis=0) > NEAR
+    shape = m.shape.copy()
+    shape[:, points] = np.where(seen.any(axis=0), np.where(good, place, rough), m.shape[:, points])
+    return Bundle(replace(m, shape=shape), bundle.kappa)

@@ -8,8 +8,9 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.outliers import medians
 from reconstruction.mapping.solid.adjustment import Adjustment, adjust
+from reconstruction.mapping.solid.building import TAIL_SIGMAS
 from reconstruction.mapping.solid.bundle import Bundle, Loss, Prior
-from reconstruction.mapping.solid.solid import TAIL_SIGMAS, Solid
+from reconstruction.mapping.solid.solid import Solid
 from reconstruction.window.robust import deviation
 
 ROUNDS = 4  # of robust weights of a pose

@@ -12,7 +12,7 @@ from reconstruction.mapping.outliers import medians
 
 COMPARED = 120  # points: enough to tell views apart
 ROUNDS = 4  # of robust weights
-FEWEST_SHARED = 3  # points
+FEWEST_SHARED = 10  # points: fewer agree by chance, front and back of a thing that has turned right round
 BESIDE = 7  # views next to the first from which a point's place in it is taken
 
 

@@ -11,9 +11,9 @@ from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.solid import learned_map
-from reconstruction.mapping.solid.deformations import POINTS, inverted, learned
-from reconstruction.mapping.solid.learned_map import followed, with_deformations
+from reconstruction.mapping.solid.deforming import learned_map
+from reconstruction.mapping.solid.deforming.deformations import POINTS, inverted, learned
+from reconstruction.mapping.solid.deforming.learned_map import followed, with_deformations
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import MOST_MODES, Settings
 from reconstruction.state import State

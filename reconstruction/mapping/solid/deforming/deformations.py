@@ -18,9 +18,9 @@ from scipy.linalg.lapack import dpotrf, dpotri
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.constraints import ALL_ROWS
 from reconstruction.basis.model import Model
+from reconstruction.mapping.solid.building import TAIL_SIGMAS
 from reconstruction.mapping.solid.bundle import Loss
 from reconstruction.mapping.solid.placing import well_spread
-from reconstruction.mapping.solid.solid import TAIL_SIGMAS
 from reconstruction.state import POSE, State
 from reconstruction.window.energy import Pull
 from reconstruction.window.robust import deviation, lengths

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reconstruction.mapping.solid.freedom import modes_held
+from reconstruction.mapping.solid.deforming.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES
 from tests.reconstruction.world import PERSPECTIVE, relief, seen, turns

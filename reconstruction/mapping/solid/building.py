@@ -1,0 +1,149 @@
+"""A rigid shape built up from its keyframes: from all at once by factorisation, or from the views most alike onwards."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reconstruction import ReconstructionError
+from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.mapping.factorization import factorize
+from reconstruction.mapping.outliers import medians
+from reconstruction.mapping.solid.adjustment import Adjustment, adjust
+from reconstruction.mapping.solid.bundle import Bundle, Loss, prior_of
+from reconstruction.mapping.solid.placing import FEWEST_POINTS, FEWEST_VIEWS, located, placed_by
+from reconstruction.window.robust import RAYLEIGH_MEDIAN, deviation
+
+FIRST_VIEWS = 4  # adjusted together first; then twice as many, and so on
+SEEN_TWICE = 2  # views in which a point has a depth
+TAIL_SIGMAS = 3.0  # of the residuals, where the loss leaves the parabola
+OWN_SIGMAS = 5.0  # of a point's own residuals, where its loss does, once the poses are known
+LEAST_TAIL = 0.005  # of the size: what tracks of a fine surface are off by anyway
+PLACING = Adjustment(steps=5, tolerance=1e-2, points=False)
+GROWING = Adjustment(steps=6, tolerance=1e-2)
+SETTLING = Adjustment(steps=15, tolerance=1e-3)
+PLACING_POINTS = Adjustment(steps=15, tolerance=1e-3, poses=False)
+FLAT = 1e5  # weight of a depth off a plane
+ROUNDS = 3  # of the noise at the end
+
+
+@dataclass(frozen=True)
+class Build:
+    """Keyframes in building order, lengths in units of the shape's RMS radius.
+
+    Attributes:
+        W: (K, 2, p) relative to the principal point.
+        h: (K, p) visibility.
+        first: (2, p) all points in the first.
+        turn, scale: (K,) the similarity from the view each is built on: e^(i angle), and scale.
+        parent: (K,) index of that view.
+        kappa: 1/focal length as given; 0 for an orthographic camera.
+        flat: whether the shape is a plane.
+    """
+
+    W: Array
+    h: Array
+    first: Array
+    turn: NDArray[np.complex128]
+    scale: Array
+    parent: Indices
+    kappa: float
+    flat: bool
+
+    def of(self, points: Indices) -> "Build":
+        """The same of some points."""
+        return replace(self, W=self.W[:, :, points], h=self.h[:, points], first=self.first[:, points])
+
+    def factorized(self) -> list[Bundle]:
+        """From all views at once, as if there were no perspective (Tomasi and Kanade); where there is, either way round.
+
+        Nothing where too little is seen.
+        """
+        often = (self.h > 0).sum(axis=0) >= FEWEST_VIEWS
+        try:
+            found = factorize(self.W[:, :, often], self.h[:, often] > 0)
+        except (ReconstructionError, np.linalg.LinAlgError):
+            return []
+        shape = np.zeros((3, len(often)))
+        shape[:, often] = found.motion.shape
+        bundle = located(self.W, self.h, Bundle(replace(found.motion, shape=shape), self.kappa), ~often)
+        return [bundle, bundle.reversed()] if self.kappa else [bundle]
+
+    def grown(self, start: RigidMotion) -> Bundle:
+        """First the views most alike, then more and more, each placed by points that have been seen twice before it."""
+        bundle = Bundle(start, self.kappa)
+        count, total = 1, len(self.W)
+        while count < total:
+            more = min(max(FIRST_VIEWS, 2 * count), total)
+            known = (self.h[:count] > 0).sum(axis=0) >= min(SEEN_TWICE, count)
+            placing = self._by(known, count)
+            bundle, _ = placing.adjusted(placing.with_views(bundle, more), PLACING)
+            bundle = located(self.W[:more], self.h[:more], bundle, ~known)
+            bundle, _ = self.adjusted(bundle, GROWING)
+            count = more
+        return bundle
+
+    def settled(self, bundle: Bundle, *, refine: bool) -> tuple[Bundle, float]:
+        """All at once until nothing changes, and its energy an observation; `refine`: the focal length, too."""
+        bundle, value = self.adjusted(bundle, SETTLING)
+        for _ in range(ROUNDS):
+            bundle, value = self.adjusted(bundle, SETTLING, refine=refine, redescending=True)
+        return bundle, value
+
+    def completed(self, bundle: Bundle, points: Indices) -> Bundle:
+        """A bundle of some points with all of them where its poses place them, each as well as it moves with the others.
+
+        What agrees best gives the poses; a mouth that opens and shuts would be where it is most often, not in between.
+        """
+        shape = placed_by(self.W, self.h, bundle)
+        shape[:, points] = bundle.motion.shape
+        bundle = Bundle(replace(bundle.motion, shape=shape), bundle.kappa)
+        for _ in range(ROUNDS):
+            residual = np.where(self.h > 0, np.linalg.norm(bundle.image() - self.W, axis=1), np.nan)
+            sigma = deviation(residual[self.h > 0], LEAST_TAIL / TAIL_SIGMAS)
+            own = np.nan_to_num(medians(residual, axis=0)) / RAYLEIGH_MEDIAN
+            scale = TAIL_SIGMAS * sigma if self.flat else OWN_SIGMAS * own.clip(sigma)  # nothing of a plane is livelier
+            bundle, _ = self._minimised(bundle, Loss(scale, True), sigma, PLACING_POINTS)
+        return bundle
+
+    def with_views(self, bundle: Bundle, count: int) -> Bundle:
+        """The first `count` views, new ones posed as the view they are built on."""
+        m = bundle.motion
+        R, s, t = list(m.R), list(m.s), list(m.t)
+        for k in range(len(s), count):
+            parent, angle = self.parent[k], self.turn[k]
+            Rz = np.array([[angle.real, -angle.imag, 0.0], [angle.imag, angle.real, 0.0], [0.0, 0.0, 1.0]])
+            R.append(Rz @ R[parent])
+            s.append(s[parent] * self.scale[k])
+            seen = s[k] * R[k] @ m.shape
+            off = self.W[k] * (1 + bundle.kappa * seen[2]) - seen[:2]
+            t.append(np.median(off[:, self.h[k] > 0], axis=1))
+        return Bundle(RigidMotion(m.shape, np.array(R), np.array(s), np.array(t)), bundle.kappa)
+
+    def adjusted(
+        self, bundle: Bundle, how: Adjustment, *, refine: bool = False, redescending: bool = False
+    ) -> tuple[Bundle, float]:
+        """Adjusted with a loss and priors scaled to the residuals, and its energy an observation."""
+        n = len(bundle.motion.s)
+        off = np.linalg.norm(bundle.image() - self.W[:n], axis=1)[self.h[:n] > 0]
+        sigma = deviation(off, LEAST_TAIL / TAIL_SIGMAS)
+        return self._minimised(bundle, Loss(TAIL_SIGMAS * sigma, redescending), sigma, how, refine=refine)
+
+    def _by(self, known: Mask, count: int) -> "Build":
+        """The same with views from `count` on showing points (p,) that are known alone, those that show enough of them."""
+        h = self.h.copy()
+        enough = count + np.flatnonzero((h[count:, known] > 0).sum(axis=1) >= FEWEST_POINTS)
+        h[np.ix_(enough, ~known)] = 0.0
+        return replace(self, h=h)
+
+    def _minimised(
+        self, bundle: Bundle, loss: Loss, sigma: float, how: Adjustment, *, refine: bool = False
+    ) -> tuple[Bundle, float]:
+        """Adjusted with a loss, and priors scaled to residuals of that deviation."""
+        n = len(bundle.motion.s)
+        W, h = self.W[:n], self.h[:n]
+        prior = prior_of(bundle, h, sigma, self.kappa, refine=refine)
+        prior = replace(prior, depth=FLAT) if self.flat else prior
+        bundle, value = adjust(W, h, bundle, loss, prior, how)
+        return bundle.centred(), value / h.sum()

@@ -1,0 +1,1 @@
+"""A solid that deforms: how freely, and which deformations it shows."""
