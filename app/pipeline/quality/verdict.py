@@ -35,10 +35,10 @@ MOST_STRETCH = 0.0042
 FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
-# What a solid that does not deform leaves over, over its radius: by more, what changes is no longer small.
-POOR_CHANGE = 0.028
-# Of that what neighbours share, which is no noise, over the sine of its turn: as much its depth may be off, and more.
-FAIR_DEPTH = 0.0125
+# What a solid that does not deform leaves over and neighbours share, which is no noise, over its radius and the sine of its
+# turn: as much its depth may be off, and more.
+FAIR_DEPTH, POOR_DEPTH = 0.0125, 0.045
+FAIR_CHANGE = 0.028  # the same with noise, over the radius alone: what changes is no longer small
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
@@ -219,10 +219,9 @@ def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
     whole, edges = np.array([evidence.solid.whole_px, evidence.solid.edges_px]) / radius_px
     turn = evidence.turn_degrees
     told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
-    if whole > POOR_CHANGE:
-        yield Verdict("poor", told)
-    elif np.sqrt(max(whole**2 - edges**2, 0.0)) > FAIR_DEPTH * np.sin(np.radians(min(turn, 90.0))):
-        yield Verdict("fair", f"{told}; film it turning more")
+    depth = np.sqrt(max(whole**2 - edges**2, 0.0)) / np.sin(np.radians(np.clip(turn, 1.0, 90.0)))
+    if depth > FAIR_DEPTH or whole > FAIR_CHANGE:
+        yield Verdict("poor" if depth > POOR_DEPTH else "fair", f"{told}; film it turning more")
     deep, half = relief(motion.shape), evidence.relief
     if max(deep, half) > OTHERWISE_DEEP * min(deep, half):
         told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"

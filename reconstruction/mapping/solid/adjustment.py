@@ -12,6 +12,7 @@ from reconstruction.arrays import Array
 from reconstruction.mapping.solid.bundle import NEAREST, POSE, Bundle, Derivatives, Loss, Prior, off_plane
 from reconstruction.mapping.solid.factors import Factors
 
+SMALLEST = 1e-2  # scale of a view over that of another: a loss that leaves the parabola may shrink one that does not fit
 GIVING_UP = 1e6  # damping at which no step helps any more
 FIXED = [0, 1, 2, 5]  # of the first view: its turn and scale are the shape's axes and unit
 
@@ -64,9 +65,13 @@ def adjust(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior, how: Ad
 
 
 def energy(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior) -> float:
-    """What `adjust` minimises; infinite with a point seen too close to the camera, or a step beyond all numbers."""
-    Y = bundle.placed()
-    if not np.isfinite(Y).all() or bundle.kappa * np.where(h > 0, Y[:, 2], 0.0).min() < NEAREST - 1:
+    """What `adjust` minimises; infinite with a point seen too close to the camera, or a view that shrinks to one."""
+    Y, s = bundle.placed(), bundle.motion.s
+    if (
+        not np.isfinite(Y).all()
+        or s.min() < SMALLEST * s.max()
+        or bundle.kappa * np.where(h > 0, Y[:, 2], 0.0).min() < NEAREST - 1
+    ):
         return float("inf")
     return float((h * loss.value(((bundle.image(Y) - W) ** 2).sum(axis=1))).sum()) + prior.value(bundle)
 

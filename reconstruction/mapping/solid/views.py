@@ -12,7 +12,8 @@ from reconstruction.mapping.outliers import medians
 
 COMPARED = 120  # points: enough to tell views apart
 ROUNDS = 4  # of robust weights
-FEWEST_SHARED = 10  # points: fewer agree by chance, front and back of a thing that has turned right round
+FEWEST_SHARED = 3  # points, ...
+ENOUGH_SHARED = 10  # ... and so many, or a third of what either shows: few agree by chance, those of front and back
 BESIDE = 7  # views next to the first from which a point's place in it is taken
 
 
@@ -47,7 +48,9 @@ def likeness(W: Array, visible: Mask) -> Likeness:
         off = np.abs(cj - a[:, :, None] * ci)
         middle = np.nan_to_num(medians(np.where(both, off, np.nan), axis=2))
         w = both / (1 + (off / (2 * middle + 1e-12)[:, :, None]) ** 2) ** 2
-    known = both.sum(axis=2) >= FEWEST_SHARED
+    shared = both.sum(axis=2)
+    shown = np.diag(shared)
+    known = shared >= np.clip(np.minimum(shown[:, None], shown) / 3, FEWEST_SHARED, ENOUGH_SHARED)
     known &= size > 0
     b = np.where(known, mean_j - a * mean_i, np.nan)
     return Likeness(np.where(known, a, 1.0), b, np.where(known, middle, 1e6 * (middle[known].max(initial=0.0) + 1e-300)))
