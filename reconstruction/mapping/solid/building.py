@@ -105,7 +105,7 @@ class Build:
             own = np.nan_to_num(medians(residual, axis=0)) / RAYLEIGH_MEDIAN
             scale = TAIL_SIGMAS * sigma if self.flat else OWN_SIGMAS * own.clip(sigma)  # nothing of a plane is livelier
             bundle, _ = self._minimised(bundle, Loss(scale, True), sigma, PLACING_POINTS)
-        return bundle
+        return located(self.W, self.h, bundle, (self.h > 0).sum(axis=0) < SEEN_TWICE)
 
     def with_views(self, bundle: Bundle, count: int) -> Bundle:
         """The first `count` views, new ones posed as the view they are built on."""

@@ -14,6 +14,7 @@ MOST_POINTS = 1000  # are adjusted together with the poses; of dense ones the ot
 DOME = 0.4  # height of the shape it starts from, over its RMS radius
 FLAT_DOME = 1e-3  # of that, for a plane
 FAR = 4.0  # usual distances from the middle, beyond which a place by linear least squares is not believed
+BESIDE = 5  # points beside one that only one view shows
 NEAR = 0.3  # a point's depth over its view's, nearer than which it is not believed either
 
 
@@ -65,20 +66,27 @@ def placed_by(W: Array, h: Array, bundle: Bundle) -> Array:
 def located(W: Array, h: Array, bundle: Bundle, points: Mask) -> Bundle:
     """A bundle in which points (p,) are where its views (K, 2, p) with weights (K, p) see them, others stay.
 
-    Where two views or more do not place them well they are as far away as the shape's middle in the first that sees them.
+    Where two views or more do not place them well they are as far away as others beside them, in a view that shows both.
     """
-    m = bundle.motion
-    seen = h[:, points] > 0
+    m, seen = bundle.motion, h > 0
+    known = seen & ~points
     middle = np.median(m.shape[:, ~points], axis=1, keepdims=True)
     usual = np.sqrt(np.median(((m.shape[:, ~points] - middle) ** 2).sum(axis=0)))
-    view = seen.argmax(axis=0)
-    deep = (m.s * (m.R @ middle)[:, 2, 0])[view]
-    beside = W[view, :, np.flatnonzero(points)] * (1 + bundle.kappa * deep)[:, None] - m.t[view]
-    rough = np.einsum("pba,pb->ap", m.R[view], np.column_stack([beside, deep])) / m.s[view]
+    shape = m.shape.copy()
+    view = np.where(seen, 1 + known.sum(axis=1)[:, None], 0).argmax(axis=0)
+    for k in np.unique(view[points & seen.any(axis=0)]):
+        new, beside = np.flatnonzero(points & seen[k] & (view == k)), np.flatnonzero(known[k])
+        depth = m.s[k] * (m.R[k, 2] @ (shape[:, beside] if len(beside) else middle))
+        apart = (
+            np.linalg.norm(W[k][:, new, None] - W[k][:, None, beside], axis=0) if len(beside) else np.zeros((len(new), 1))
+        )
+        near = np.argsort(apart, axis=1)[:, :BESIDE]
+        deep = np.median(depth[near], axis=1)
+        place = np.concatenate([W[k][:, new] * (1 + bundle.kappa * deep) - m.t[k][:, None], deep[None]])
+        shape[:, new] = m.R[k].T @ place / m.s[k]
     place = placed_by(W[:, :, points], h[:, points], bundle)
     nearness = 1 + bundle.kappa * np.einsum("ka,ap->kp", m.s[:, None] * m.R[:, 2], place)
-    good = (seen.sum(axis=0) > 1) & (np.linalg.norm(place - middle, axis=0) < FAR * usual)
-    good &= np.where(seen, nearness, 1.0).min(axis=0) > NEAR
-    shape = m.shape.copy()
-    shape[:, points] = np.where(seen.any(axis=0), np.where(good, place, rough), m.shape[:, points])
+    good = (seen[:, points].sum(axis=0) > 1) & (np.linalg.norm(place - middle, axis=0) < FAR * usual)
+    good &= np.where(seen[:, points], nearness, 1.0).min(axis=0) > NEAR
+    shape[:, points] = np.where(good, place, shape[:, points])
     return Bundle(replace(m, shape=shape), bundle.kappa)

@@ -162,3 +162,11 @@ def test_what_it_was_told_to_be_and_is_not(sureness: float, grade: str) -> None:
     said = verdict(course([0.003] * 50), replace(SOLID, evidence=replace(EVIDENCE, kind="sheet", sureness=sureness)))
     assert said.grade == grade
     assert "it is a sheet, not a solid" in said.reason
+
+
+def test_points_of_a_solid_that_hardly_any_keyframe_shows() -> None:
+    seen = np.ones((30, REST.motion.shape.shape[1]), bool)
+    seen[2:, :1] = False
+    assert verdict(course([0.001] * 50), replace(SOLID, seen=np.tile(seen, 2)[:, :50])).grade == "fair"
+    seen[2] = True
+    assert verdict(course([0.001] * 50), replace(SOLID, seen=seen)).grade == "good"

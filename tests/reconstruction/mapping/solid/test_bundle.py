@@ -121,3 +121,22 @@ def test_adjusting_never_makes_it_worse():
         assert value < before
         assert (after.motion.shape != bundle.motion.shape).any() == points
         np.testing.assert_allclose(after.motion.R[0], bundle.motion.R[0], atol=1e-12)
+
+
+def test_points_that_are_not_seen_may_be_anywhere_those_that_are_may_not() -> None:
+    bundle = some(np.random.default_rng(2), kappa=0.3)
+    behind = bundle.motion.shape.copy()
+    behind[:, 0] = -20.0 * bundle.motion.R[0, 2]  # behind the first camera
+    bundle = Bundle(replace(bundle.motion, shape=behind), 0.3)
+    W, h = bundle.image(), np.ones((3, 7))
+    assert energy(W, h, bundle, Loss(1.0, False), FREE) == np.inf
+    h[:, 0] = 0.0
+    assert np.isfinite(energy(W, h, bundle, Loss(1.0, False), FREE))
+    assert np.isfinite(Derivatives(bundle).by_pose).all()
+
+
+def test_no_view_shrinks_to_a_point() -> None:
+    bundle = some(np.random.default_rng(3), kappa=0.0)
+    W, h = bundle.image(), np.ones((3, 7))
+    small = Bundle(replace(bundle.motion, s=bundle.motion.s * [1.0, 1e-3, 1.0]), 0.0)
+    assert energy(W, h, small, Loss(1.0, False), FREE) == np.inf

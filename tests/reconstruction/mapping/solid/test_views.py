@@ -58,3 +58,15 @@ def test_points_that_no_view_shows_are_where_they_were_known_to_be() -> None:
     alone = with_unseen(shape, seen, None)
     np.testing.assert_allclose(alone[:, seen], true[:, seen])
     np.testing.assert_allclose(alone[:, ~seen].T, np.tile(true[:, seen].mean(axis=1), (4, 1)))
+
+
+def test_front_and_back_are_not_alike_for_few_points_they_share() -> None:
+    rng = np.random.default_rng(5)
+    W, visible = rng.normal(0, 50, (3, 2, 80)), np.ones((3, 80), bool)
+    W[1] = W[0] + rng.normal(0, 1, (2, 80))
+    W[2, :, 36:44] = W[0, :, 36:44]  # by chance
+    visible[:2, 44:] = False
+    visible[2, :36] = False
+    apart = likeness(W, visible).distance
+    assert apart[0, 2] > 1e3 * apart[0, 1]
+    assert likeness(W[:, :, 36:], visible[:, 36:]).distance[0, 2] < 1e-6  # all that either shows
