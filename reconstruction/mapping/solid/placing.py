@@ -69,24 +69,29 @@ def located(W: Array, h: Array, bundle: Bundle, points: Mask) -> Bundle:
     Where two views or more do not place them well they are as far away as others beside them, in a view that shows both.
     """
     m, seen = bundle.motion, h > 0
-    known = seen & ~points
     middle = np.median(m.shape[:, ~points], axis=1, keepdims=True)
     usual = np.sqrt(np.median(((m.shape[:, ~points] - middle) ** 2).sum(axis=0)))
-    shape = m.shape.copy()
-    view = np.where(seen, 1 + known.sum(axis=1)[:, None], 0).argmax(axis=0)
-    for k in np.unique(view[points & seen.any(axis=0)]):
-        new, beside = np.flatnonzero(points & seen[k] & (view == k)), np.flatnonzero(known[k])
-        depth = m.s[k] * (m.R[k, 2] @ (shape[:, beside] if len(beside) else middle))
-        apart = (
-            np.linalg.norm(W[k][:, new, None] - W[k][:, None, beside], axis=0) if len(beside) else np.zeros((len(new), 1))
-        )
-        near = np.argsort(apart, axis=1)[:, :BESIDE]
-        deep = np.median(depth[near], axis=1)
-        place = np.concatenate([W[k][:, new] * (1 + bundle.kappa * deep) - m.t[k][:, None], deep[None]])
-        shape[:, new] = m.R[k].T @ place / m.s[k]
     place = placed_by(W[:, :, points], h[:, points], bundle)
     nearness = 1 + bundle.kappa * np.einsum("ka,ap->kp", m.s[:, None] * m.R[:, 2], place)
     good = (seen[:, points].sum(axis=0) > 1) & (np.linalg.norm(place - middle, axis=0) < FAR * usual)
     good &= np.where(seen[:, points], nearness, 1.0).min(axis=0) > NEAR
+    shape = beside_others(W, seen, bundle, points)
     shape[:, points] = np.where(good, place, shape[:, points])
     return Bundle(replace(m, shape=shape), bundle.kappa)
+
+
+def beside_others(W: Array, seen: Mask, bundle: Bundle, points: Mask) -> Array:
+    """The shape (3, p), points (p,) on the ray of the view that shows most others as well, as deep as those beside them."""
+    m, others = bundle.motion, seen & ~points
+    shape = m.shape.copy()
+    view = np.where(seen, 1 + others.sum(axis=1)[:, None], 0).argmax(axis=0)
+    for k in np.unique(view[points & seen.any(axis=0)]):
+        new, known = np.flatnonzero(points & seen[k] & (view == k)), np.flatnonzero(others[k])
+        if not len(known):
+            continue
+        depth = m.s[k] * (m.R[k, 2] @ shape[:, known])
+        apart = np.linalg.norm(W[k][:, new, None] - W[k][:, None, known], axis=0)
+        deep = np.median(depth[np.argsort(apart, axis=1)[:, :BESIDE]], axis=1)
+        ray = W[k][:, new] * (1 + bundle.kappa * deep) - m.t[k][:, None]
+        shape[:, new] = m.R[k].T @ np.concatenate([ray, deep[None]]) / m.s[k]
+    return shape
