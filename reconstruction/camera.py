@@ -37,6 +37,12 @@ class Camera:
         return scaled + self.center_px[:, None]
 
 
+def lens(W: Array, sizes: float) -> Camera:
+    """A camera in perspective before points (K, 2, p) px, NaN where not seen, its focal length so many times their size."""
+    size = float(np.nanmedian(np.sqrt(np.nanvar(W, axis=2).sum(axis=1))))
+    return Camera(sizes * size, np.nanmean(W, axis=(0, 2)))
+
+
 def _hamilton() -> Array:
     """LEFT (4, 4, 4): ab = (Σ_i a_i LEFT[i]) b, w first."""
     left = np.zeros((4, 4, 4))

@@ -1,9 +1,9 @@
 """The camera of tracks that nobody knows the camera of: orthographic, or in perspective."""
 
 from reconstruction.arrays import Array, Mask
-from reconstruction.camera import Camera
+from reconstruction.camera import Camera, lens
 from reconstruction.mapping.keyframes import Keyframes, thinned
-from reconstruction.mapping.map import Map, lens, map_of
+from reconstruction.mapping.map import Map, map_of
 from reconstruction.mapping.selection import Kind
 
 USUAL_LENS = 5.0  # focal length over the object's size, RMS: of what fills half a picture

@@ -11,7 +11,7 @@ from reconstruction.basis import distances
 from reconstruction.basis.mesh import Mesh, ratio_of_sizes
 from reconstruction.basis.model import Model, build_model
 from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, medoid, rms_radius
-from reconstruction.camera import Camera, nearest_rotation
+from reconstruction.camera import Camera, lens, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, sheet
 from reconstruction.mapping.isometric.bundle import FUNCTIONS
 from reconstruction.mapping.isometric.focal import focal, under
@@ -28,6 +28,9 @@ from reconstruction.state import State
 FEWEST_KEYFRAMES, FEWEST_POINTS = 6, 20
 LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
 ASSUMED = "focal length {:.0f} px assumed: give it if you know better"
+MOST_STRETCH = (
+    0.018  # change of a sheet's lengths at the end, noise apart: cloth and creases 1 %, what is no sheet 2 % and more
+)
 RIGID = 0.005  # residual over the size, up to which a solid is rigid enough to hold a focal length
 
 
@@ -169,12 +172,15 @@ def map_of(
             lambda parts: ([through(by_part(whole(), part), W[part]) for part in parts], whole().strain_beyond_noise),
             start,
         )
-        kind = kind or evidence.kind
-        if kind == "flat" or (given is not None and kind != "sheet"):
+        made = kind or evidence.kind
+        if made == "flat" or (given is not None and made != "sheet"):
             return None
-        if kind == "sheet":
+        found = None
+        if made == "sheet":
             found = sheet_map(W, camera, whole(), evidence, start, estimate_focal=estimate_focal, given=given, last=last)
-        else:
+            if kind is None and given is None and found.sheet and found.sheet.strain_beyond_noise > MOST_STRETCH:
+                found, evidence = None, replace(evidence, kind="solid")
+        if found is None:
             found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known, last=last)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
@@ -187,12 +193,6 @@ def map_of(
 def through(found: IsometricSheet, W: Array) -> tuple[Array, Array]:
     """Shapes (K, 3, p) of a sheet in its keyframes, smooth, and through the points W (K, 2, p) px as they were seen."""
     return found.shapes(), found.through(W)
-
-
-def lens(W: Array, sizes: float) -> Camera:
-    """A camera in perspective before points (K, 2, p) px, NaN where not seen, its focal length so many times their size."""
-    size = float(np.nanmedian(np.sqrt(np.nanvar(W, axis=2).sum(axis=1))))
-    return Camera(sizes * size, np.nanmean(W, axis=(0, 2)))
 
 
 def solid_map(

@@ -11,7 +11,9 @@ from reconstruction.basis.model import build_model
 from reconstruction.basis.rest_shape import completed, given, medoid
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
+from reconstruction.mapping import map as maps
 from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.selection import Kind
 from reconstruction.online import Reconstruction
 from reconstruction.settings import Settings
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
@@ -47,6 +49,20 @@ def test_a_sheet_that_is_never_flat() -> None:
     posed = s[:, None, None] * R @ found.rest.motion.shape
     image = (posed[:, :2] + t[:, :, None]) / (1 + posed[:, 2:] / CAMERA.focal_px) + CAMERA.center_px[:, None]
     assert np.median(np.abs(image - W[::2])) < 0.05 * np.ptp(W)
+
+
+@pytest.mark.parametrize("kind", [None, "sheet"])
+def test_what_stretches_after_all_is_a_solid_unless_it_is_said_to_be_a_sheet(
+    kind: Kind | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(maps, "MOST_STRETCH", 1e-4)
+    W, _, sheet = waving()
+    assert sheet.sheet is not None
+    assert sheet.sheet.strain_beyond_noise > 1e-4
+    found = map_of(W[::2], np.ones((FRAMES // 2, POINTS), bool), CAMERA, estimate_focal=False, kind=kind)
+    assert found is not None
+    assert found.evidence is not None
+    assert (found.rest.kind, found.evidence.kind) == (("rigid", "solid") if kind is None else ("isometric", "sheet"))
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
