@@ -19,6 +19,8 @@ from reconstruction.mapping.evidence import (
 from reconstruction.mapping.factorization import affine_structure, factorize, view_turn_degrees
 from reconstruction.mapping.rigid import bundle_adjust
 from reconstruction.mapping.solid import solid
+from reconstruction.mapping.solid.bundle import Bundle
+from reconstruction.mapping.solid.placing import beside_others
 
 VIEWS = 16  # of the first frames are enough for a plane
 BENT = 0.012  # reprojection error over the image's extent, above which a sheet is not flat in all frames
@@ -70,12 +72,7 @@ def factorize_often_seen(W: Array, visible: Mask) -> RigidMotion:
         often[often] = near  # too few views, too much alike: the others would suffer, too
     shape = np.zeros((3, W.shape[2]))
     shape[:, often] = motion.shape
-    for i in np.flatnonzero(~often & visible.any(axis=0)):
-        f = int(visible[:, i].argmax())
-        placed = motion.s[f] * motion.R[f] @ motion.shape
-        place = W[f, :, i] - motion.t[f]
-        beside = np.argsort(((placed[:2].T - place) ** 2).sum(axis=1))[:4]
-        shape[:, i] = motion.R[f].T @ np.append(place, placed[2, beside].mean()) / motion.s[f]
+    shape = beside_others(W, visible, Bundle(replace(motion, shape=shape), 0.0), ~often)
     return replace(motion, shape=shape)
 
 
