@@ -28,9 +28,7 @@ from reconstruction.state import State
 FEWEST_KEYFRAMES, FEWEST_POINTS = 6, 20
 LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
 ASSUMED = "focal length {:.0f} px assumed: give it if you know better"
-MOST_STRETCH = (
-    0.018  # change of a sheet's lengths at the end, noise apart: cloth and creases 1 %, what is no sheet 2 % and more
-)
+MOST_STRETCH = 0.018  # change of a sheet's lengths at the end, noise apart: of creases and cloth 1 %, else it is none
 RIGID = 0.005  # residual over the size, up to which a solid is rigid enough to hold a focal length
 
 

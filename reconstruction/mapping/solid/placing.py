@@ -72,9 +72,9 @@ def located(W: Array, h: Array, bundle: Bundle, points: Mask) -> Bundle:
     middle = np.median(m.shape[:, ~points], axis=1, keepdims=True)
     usual = np.sqrt(np.median(((m.shape[:, ~points] - middle) ** 2).sum(axis=0)))
     place = placed_by(W[:, :, points], h[:, points], bundle)
-    nearness = 1 + bundle.kappa * np.einsum("ka,ap->kp", m.s[:, None] * m.R[:, 2], place)
+    far = bundle.farness(Bundle(replace(m, shape=place), bundle.kappa).placed())
     good = (seen[:, points].sum(axis=0) > 1) & (np.linalg.norm(place - middle, axis=0) < FAR * usual)
-    good &= np.where(seen[:, points], nearness, 1.0).min(axis=0) > NEAR
+    good &= np.where(seen[:, points], far, 1.0).min(axis=0) > NEAR
     shape = beside_others(W, seen, bundle, points)
     shape[:, points] = np.where(good, place, shape[:, points])
     return Bundle(replace(m, shape=shape), bundle.kappa)
