@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from reconstruction.arrays import Array, Indices, Mask
-from reconstruction.basis.mesh import triangulate
+from reconstruction.basis.mesh import Mesh, neighbour_averages, triangulate
 from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.mapping.solid.bundle import Bundle, Derivatives
@@ -28,6 +28,8 @@ ASIDE = 0.02  # weight of a point that does not move with the solid among the ne
 LEAST = 0.05  # of the usual distance from the neighbours' plane: no depth is surer
 ROUNDS = 3  # of leaving out what is a spike
 LARGEST = 0.8  # times half the width, both RMS, that a vertex may be off its neighbours' plane; 12 % of the width across
+AS_OFTEN = 0.8  # as its neighbours a point is seen, or its track is doubtful
+LARGEST_NEW = 0.4  # times half the width, that it may come to be off while deformations are learned
 USUAL = 4.0  # times the usual distance that it may, too: with few points, most are far from their neighbours' plane
 PROVEN = 20.0  # standard deviations of its depth that it may, too: a nose of few points is no spike
 SMOOTHEST = 0.1  # times half the width: no surface is believed to be smoother, or creases would be rounded
@@ -72,6 +74,36 @@ def smoothed(visible: Mask, bundle: Bundle, residual: Array) -> tuple[RigidMotio
         sound = sound & ~far
         z = z - np.where(far, off_neighbours_plane(shape[:2], edges, sound)[0] @ z, 0.0)
     return replace(bundle.motion, shape=axes @ (shape + along(information, z - shape[2]))), sound
+
+
+def without_new_spikes(shape: Array, before: Array, visible: Mask) -> Array:
+    """A shape in which doubtful points that have left their neighbours since an earlier one are back with them.
+
+    Args:
+        shape: (3, p).
+        before: (3, p) the earlier one.
+        visible: (K, p) in keyframes.
+    """
+    axes = principal_axes(before)
+    flat = (axes.T @ before)[:2]
+    deep = float(np.sqrt(np.var(flat, axis=1).mean())) / 2
+    mesh, change = triangulate(flat.T), shape - before
+    edges, doubted = mesh.edges, lost_alone(mesh, visible)
+    sound = np.ones(shape.shape[1], np.bool_)
+    all_neighbours, _ = off_neighbours_plane(flat, edges, sound)
+    for _ in range(ROUNDS):
+        off = np.linalg.norm(change @ all_neighbours.T, axis=0)
+        far = doubted & (off > max(LARGEST_NEW * deep, USUAL * float(np.median(off)) / 0.6745))
+        sound = sound & ~far
+        change = change - np.where(far, change @ off_neighbours_plane(flat, edges, sound)[0].T, 0.0)
+    return before + change
+
+
+def lost_alone(mesh: Mesh, visible: Mask) -> Mask:
+    """Which points (p,) are seen (K, p) much more seldom than those around: they were lost, so they were followed badly."""
+    count = visible.sum(axis=0)
+    ring = neighbour_averages(mesh, len(count))
+    return np.asarray(count < AS_OFTEN * (ring @ (ring @ count)))
 
 
 def solved(A: sp.csc_array, b: Array) -> Array:

@@ -21,6 +21,7 @@ from reconstruction.basis.model import Model
 from reconstruction.mapping.solid.building import TAIL_SIGMAS
 from reconstruction.mapping.solid.bundle import Loss
 from reconstruction.mapping.solid.placing import well_spread
+from reconstruction.mapping.solid.spikes import without_new_spikes
 from reconstruction.state import POSE, State
 from reconstruction.window.energy import Pull
 from reconstruction.window.robust import deviation, lengths
@@ -110,6 +111,7 @@ def learned(model: Model, W: Array, visible: Mask, state: State, rounds: int = R
         off = residuals(B, seen, state.matrices(), focal)
         h = visible * robust(noise).weight((off**2).sum(axis=1))
         B[:3] += shifts(seen, off, h, state, focal)
+    B[:3] = without_new_spikes(B[:3], model.B[:3], visible)
     return Learned(B, state, Deformations(covariance, noise))
 
 

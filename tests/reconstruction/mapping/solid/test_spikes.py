@@ -3,7 +3,7 @@ import numpy as np
 from reconstruction.basis.mesh import triangulate
 from reconstruction.evaluation import with_outliers
 from reconstruction.mapping.solid.solid import bundle_adjust
-from reconstruction.mapping.solid.spikes import off_neighbours_plane, worst_spike
+from reconstruction.mapping.solid.spikes import off_neighbours_plane, without_new_spikes, worst_spike
 from tests.reconstruction.world import PERSPECTIVE, relief, seen, shape_error, spread, turns
 
 
@@ -63,3 +63,14 @@ def test_what_deforms_more_than_the_rest_is_no_spike():
     W, _ = seen(shapes, turns(24), PERSPECTIVE)
     solid = bundle_adjust(W, np.ones((24, 150), bool), PERSPECTIVE)
     assert solid.trusted[lively].mean() > 0.9
+
+
+def test_a_point_that_leaves_its_neighbours_and_is_lost_alone_is_put_back():
+    before = relief(np.random.default_rng(5), 150)
+    visible = np.ones((20, 150), bool)
+    visible[8:, [40, 90]] = False
+    after = before + 5
+    after[2, [40, 70]] += 90  # the second is seen throughout: there is something
+    kept = without_new_spikes(after, before, visible)
+    np.testing.assert_allclose(np.delete(kept, 40, axis=1), np.delete(after, 40, axis=1))
+    np.testing.assert_allclose(kept[:, 40], before[:, 40] + 5, atol=20)
