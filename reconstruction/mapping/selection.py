@@ -93,7 +93,10 @@ class Evidence:
     @property
     def note(self) -> str:
         """In words, for the log."""
-        left = f"flat {self.flat.edges_px:.2f}, solid {self.solid.edges_px:.2f}, sheet {self.sheet.edges_px:.2f} px"
+        kinds = {"flat": self.flat, "solid": self.solid, "sheet": self.sheet}
+        left = (
+            ", ".join(f"{kind} {left.edges_px:.2f}" for kind, left in kinds.items() if not np.isnan(left.edges_px)) + " px"
+        )
         lengths = "" if np.isnan(self.length_change) else f"; lengths change by {self.length_change:.1%}"
         solid = f"turn {self.turn_degrees:.0f}°, relief {self.relief:.2f}"
         return f"{self.kind}: left over on other keyframes {left}{lengths}; {solid}"
