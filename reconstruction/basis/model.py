@@ -21,6 +21,7 @@ from reconstruction.state import State
 
 COARSE_VERTICES = 60  # at least so many,
 VERTICES_PER_MODE = 1.6  # and so many for each mode: between fewer, modes stretch
+NEAREST = 0.1  # a point's depth over its view's, as far as it matters for a mesh
 TURNS = 3  # of pose and Λ, each with the other known
 STAYS = 0.02  # pull of Λ to the frame before, against 1 of a mode that shows in all points
 
@@ -166,7 +167,7 @@ def build_model(
         camera: what sees it.
         modes: how many.
         metric: the dissimilarity they come from.
-        mesh: its mesh, if it has one; else points are triangulated in its main plane,
+        mesh: its mesh, if it has one; else points are triangulated,
         seen: and those that views (K, p) hardly ever show left out at the border: modes are those of all points.
 
     Raises:
@@ -174,16 +175,25 @@ def build_model(
     """
     from reconstruction.basis.modes import modal_basis  # SciPy takes its time to load, and who only draws needs none
 
-    shape, whole = rest.motion.shape, mesh or triangulated(rest)
+    shape, whole = rest.motion.shape, mesh or triangulated(rest, camera, seen)
     basis = modal_basis(shape, whole, modes, metric)
     shown = whole if mesh or seen is None else without_strays(whole, seen)
     return Model(basis, shown, camera, float(rest.motion.s[0]))
 
 
-def triangulated(rest: RestShape) -> Mesh:
-    """A mesh of a rest shape's points in its main plane, facing the camera in the first frame."""
-    shape = rest.motion.shape
-    return facing(triangulate((principal_axes(shape).T @ shape)[:2].T), rest.motion)
+def triangulated(rest: RestShape, camera: Camera, seen: Mask | None = None) -> Mesh:
+    """A mesh of a rest shape's points, facing the camera in the first frame.
+
+    Points of a solid are triangulated in the view that shows most of them (the first frame's where views (K, p) are not
+    given): there, none is before another. Those of a sheet in its main plane.
+    """
+    motion = rest.motion
+    if rest.kind != "rigid":
+        return facing(triangulate((principal_axes(motion.shape).T @ motion.shape)[:2].T), motion)
+    k = 0 if seen is None else int(seen.sum(axis=1).argmax())
+    placed = motion.s[k] * (motion.R[k] @ motion.shape)
+    farness = np.maximum(1 + placed[2] / camera.focal_px, NEAREST)
+    return facing(triangulate(((placed[:2] + motion.t[k][:, None]) / farness).T), motion)
 
 
 def facing(mesh: Mesh, motion: RigidMotion) -> Mesh:

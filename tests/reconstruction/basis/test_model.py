@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from reconstruction.basis.model import Model
+from reconstruction.basis.model import Model, triangulated
+from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera, rotation_from_quaternion
 from reconstruction.state import State
 from reconstruction.window import statistics
 from reconstruction.window.statistics import image_statistics
-from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, flat, model_of, random_state, relief
+from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, flat, model_of, random_state, relief, spread, turns
 
 POINTS, MODES = 40, 5
 
@@ -122,3 +123,19 @@ def test_some_of_the_points_have_the_poses_and_coefficients_of_all(rng: np.rando
     part = few.estimate(0, np.zeros((2, len(some))), visible[some], state, row=0)
     np.testing.assert_allclose(part.shape, whole.shape[:, some], atol=1e-8)
     np.testing.assert_allclose(few.projection(state, 0), model.projection(state, 0)[:, some], atol=1e-8)
+
+
+@pytest.mark.parametrize("camera", [Camera(), PERSPECTIVE])
+def test_triangles_of_a_solid_do_not_overlap_in_the_view_that_shows_most(camera: Camera) -> None:
+    rng = np.random.default_rng(0)
+    shape = np.concatenate([spread(rng, 60), rng.normal(0, 100, (1, 60))])
+    motion = RigidMotion(turns(3)[1].T @ shape, turns(3), np.ones(3), np.zeros((3, 2)))
+    seen = np.ones((3, 60), np.bool_)
+    seen[[0, 2], ::4] = False
+    faces = triangulated(RestShape("rigid", motion, ""), camera, seen).faces
+    placed = motion.R[1] @ motion.shape
+    x, y = placed[:2] / (1 + placed[2] / camera.focal_px)
+    a, b, c = faces.T
+    area = (x[b] - x[a]) * (y[c] - y[a]) - (x[c] - x[a]) * (y[b] - y[a])
+    assert (np.sign(area) == np.sign(area[0])).all()
+    assert len(np.unique(faces)) == 60
