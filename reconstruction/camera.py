@@ -6,6 +6,8 @@ import numpy as np
 
 from reconstruction.arrays import Array
 
+NEAREST = 0.1  # a point's depth over its view's, closer than which no point that is seen may come to the camera
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -35,6 +37,11 @@ class Camera:
         xy, z = points[..., :2, :], points[..., 2:3, :]
         scaled = xy * (self.focal_px / z) if self.perspective else xy
         return scaled + self.center_px[:, None]
+
+
+def farness(placed: Array, kappa: float) -> Array:
+    """Depths (..., p) of points (..., 3, p) over their middle's, at least `NEAREST`; kappa is 1/focal length."""
+    return np.maximum(1 + kappa * placed[..., 2, :], NEAREST)
 
 
 def lens(W: Array, sizes: float) -> Camera:

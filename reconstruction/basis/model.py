@@ -14,14 +14,13 @@ from reconstruction.basis.constraints import CoarseEdges
 from reconstruction.basis.mesh import Mesh, farthest_points, mesh_from_faces, triangulate, unique_edges, without_strays
 from reconstruction.basis.modal_basis import ModalBasis, principal_axes
 from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
-from reconstruction.camera import Camera, nearest_rotation, quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.camera import Camera, farness, nearest_rotation, quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
 from reconstruction.state import State
 
 COARSE_VERTICES = 60  # at least so many,
 VERTICES_PER_MODE = 1.6  # and so many for each mode: between fewer, modes stretch
-NEAREST = 0.1  # a point's depth over its view's, as far as it matters for a mesh
 TURNS = 3  # of pose and Λ, each with the other known
 STAYS = 0.02  # pull of Λ to the frame before, against 1 of a mode that shows in all points
 
@@ -192,8 +191,8 @@ def triangulated(rest: RestShape, camera: Camera, seen: Mask | None = None) -> M
         return facing(triangulate((principal_axes(motion.shape).T @ motion.shape)[:2].T), motion)
     k = 0 if seen is None else int(seen.sum(axis=1).argmax())
     placed = motion.s[k] * (motion.R[k] @ motion.shape)
-    farness = np.maximum(1 + placed[2] / camera.focal_px, NEAREST)
-    return facing(triangulate(((placed[:2] + motion.t[k][:, None]) / farness).T), motion)
+    image = (placed[:2] + motion.t[k][:, None]) / farness(placed, 1 / camera.focal_px)
+    return facing(triangulate(image.T), motion)
 
 
 def facing(mesh: Mesh, motion: RigidMotion) -> Mesh:

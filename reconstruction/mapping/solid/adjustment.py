@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from reconstruction.arrays import Array
-from reconstruction.mapping.solid.bundle import NEAREST, POSE, Bundle, Derivatives, Loss, Prior, off_plane
+from reconstruction.camera import NEAREST
+from reconstruction.mapping.solid.bundle import POSE, Bundle, Derivatives, Loss, Prior, off_plane
 from reconstruction.mapping.solid.factors import Factors
 
 SMALLEST = 1e-2  # scale of a view over that of another: a loss that leaves the parabola may shrink one that does not fit

@@ -15,10 +15,10 @@ import numpy as np
 
 from reconstruction.arrays import Array, Indices
 from reconstruction.basis.rest_shape import RigidMotion
-from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
+from reconstruction.camera import Camera, farness, quaternion_exp, rotation_from_quaternion
+from reconstruction.mapping.evidence import extent
 
 POSE = 6  # θ, t, log s of a view
-NEAREST = 0.1  # a point's depth over its view's, closer than which no point that is seen may come to the camera
 HALF_WIDTH = 0.5  # relief over width that is as deep as is believed without proof
 PROOF = 0.01  # share of the residuals that twice that relief must explain
 LOOSE = 0.3  # of one observation, says that a point is no deeper
@@ -50,7 +50,7 @@ class Bundle:
 
     def farness(self, placed: Array) -> Array:
         """Depths (K, p) of points Y (K, 3, p) over their views', at least `NEAREST`: less where nothing is seen alone."""
-        return np.maximum(1 + self.kappa * placed[:, 2], NEAREST)
+        return farness(placed, self.kappa)
 
     def reversed(self) -> "Bundle":
         """The same with its depth reversed, which explains distant views as well."""
@@ -151,7 +151,7 @@ def off_plane(shape: Array, kappa: float) -> tuple[Array, Array, Array]:
 def prior_of(bundle: Bundle, h: Array, sigma: float, kappa: float, *, refine: bool) -> Prior:
     """Depths of half the width, the focal length as given; both as weak as so many observations of that noise."""
     shape = bundle.motion.shape
-    deep = HALF_WIDTH * float(np.sqrt(np.var(shape[:2], axis=1).mean()))
+    deep = HALF_WIDTH * extent(shape[:2])
     excess = float((off_plane(shape, bundle.kappa)[0] ** 2).mean()) / deep**2
     depth = (LOOSE + PROOF * h.sum() / len(shape.T) * excess) * (sigma / deep) ** 2
     focal = FOCAL_PROOF * h.sum() * (sigma / FOCAL_DOUBT) ** 2 if refine and kappa else np.inf

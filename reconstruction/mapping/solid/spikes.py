@@ -5,6 +5,7 @@ The most likely depths z, of which the views say ẑ_i ± σ_i, on a surface who
     min Σ_i (z_i − ẑ_i)²/σ_i² + Σ_i d_i²/τ_i²,   τ_i the usual d times the neighbours' distance over the usual one.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import Mesh, neighbour_averages, triangulate
 from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.mapping.evidence import extent
 from reconstruction.mapping.solid.bundle import Bundle, Derivatives
 from reconstruction.window.robust import RAYLEIGH_MEDIAN, deviation
 
@@ -45,7 +47,7 @@ def smoothed(visible: Mask, bundle: Bundle, residual: Array) -> tuple[RigidMotio
     """
     axes = principal_axes(bundle.motion.shape)
     shape = axes.T @ bundle.motion.shape
-    deep = float(np.sqrt(np.var(shape[:2], axis=1).mean())) / 2
+    deep = extent(shape[:2]) / 2
     sigma = deviation(residual[visible], LEAST_SIGMA * deep)
     usual = np.nanmedian(np.where(visible.any(axis=0), residual, 0.0), axis=0) / RAYLEIGH_MEDIAN  # of each point
     agrees = visible & (np.nan_to_num(residual, nan=np.inf) < INLIER_SIGMAS * 1.2 * usual.clip(sigma, LIVELY * sigma))
@@ -68,11 +70,8 @@ def smoothed(visible: Mask, bundle: Bundle, residual: Array) -> tuple[RigidMotio
         stiffness = D.T @ sp.diags_array((np.median(distance) / (tau * distance)) ** 2) @ D
         z = solved((sp.diags_array(weight) + stiffness).tocsc(), weight * shape[2])
         sound = sound & ~spike(D @ z, tau)
-    D, _ = off_neighbours_plane(shape[:2], edges, np.ones_like(sound))
-    for _ in range(ROUNDS):  # what smoothing left, most of it at the border: there, the plane would carry it off
-        far = spike(D @ z, tau)
-        sound = sound & ~far
-        z = z - np.where(far, off_neighbours_plane(shape[:2], edges, sound)[0] @ z, 0.0)
+    # What smoothing left, most of it at the border: there, the plane would carry it off.
+    z, sound = put_back(z, shape[:2], edges, sound, lambda off: spike(off, tau))
     return replace(bundle.motion, shape=axes @ (shape + along(information, z - shape[2]))), sound
 
 
@@ -86,17 +85,33 @@ def without_new_spikes(shape: Array, before: Array, visible: Mask) -> Array:
     """
     axes = principal_axes(before)
     flat = (axes.T @ before)[:2]
-    deep = float(np.sqrt(np.var(flat, axis=1).mean())) / 2
+    deep = extent(flat) / 2
     mesh, change = triangulate(flat.T), shape - before
-    edges, doubted = mesh.edges, lost_alone(mesh, visible)
-    sound = np.ones(shape.shape[1], np.bool_)
-    all_neighbours, _ = off_neighbours_plane(flat, edges, sound)
+    doubted = lost_alone(mesh, visible)
+
+    def left(change: Array) -> Mask:
+        off = np.linalg.norm(change, axis=0)
+        return np.asarray(doubted & (off > max(LARGEST_NEW * deep, USUAL * float(np.median(off)) / 0.6745)))
+
+    return before + put_back(change, flat, mesh.edges, np.ones_like(doubted), left)[0]
+
+
+def put_back(values: Array, flat: Array, edges: Indices, sound: Mask, spike: Callable[[Array], Mask]) -> tuple[Array, Mask]:
+    """Values (..., p) of points (2, p), spikes put on the plane through their neighbours', and which are still sound (p,).
+
+    Args:
+        values: depths, or places.
+        flat: the points.
+        edges: (n, 2) of their mesh.
+        sound: (p,) which count as neighbours.
+        spike: which points (p,) are spikes, that are so far off (..., p).
+    """
+    all_neighbours, _ = off_neighbours_plane(flat, edges, np.ones_like(sound))
     for _ in range(ROUNDS):
-        off = np.linalg.norm(change @ all_neighbours.T, axis=0)
-        far = doubted & (off > max(LARGEST_NEW * deep, USUAL * float(np.median(off)) / 0.6745))
+        far = spike((all_neighbours @ values.T).T)
         sound = sound & ~far
-        change = change - np.where(far, change @ off_neighbours_plane(flat, edges, sound)[0].T, 0.0)
-    return before + change
+        values = values - np.where(far, (off_neighbours_plane(flat, edges, sound)[0] @ values.T).T, 0.0)
+    return values, sound
 
 
 def lost_alone(mesh: Mesh, visible: Mask) -> Mask:
