@@ -14,7 +14,7 @@ from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, m
 from reconstruction.camera import Camera, lens, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, sheet
 from reconstruction.mapping.isometric.bundle import FUNCTIONS
-from reconstruction.mapping.isometric.focal import focal, under
+from reconstruction.mapping.isometric.focal import focal
 from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, Kind, select
@@ -175,7 +175,7 @@ def map_of(
             return None
         found = None
         if made == "sheet":
-            found = sheet_map(W, camera, whole(), evidence, start, estimate_focal=estimate_focal, given=given, last=last)
+            found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=last)
             if kind is None and given is None and found.sheet and found.sheet.strain_beyond_noise > MOST_STRETCH:
                 found, evidence = None, replace(evidence, kind="solid")
         if found is None:
@@ -214,7 +214,6 @@ def sheet_map(
     camera: Camera,
     found: IsometricSheet,
     evidence: Evidence,
-    start: Start = at_once,
     *,
     estimate_focal: bool,
     given: RestShape | None = None,
@@ -223,7 +222,7 @@ def sheet_map(
     """The map of a sheet: its rest shape is the one given, else the keyframe's shape that is nearest to all others."""
     finish = partial(bundled, W=W, rounds=BUNDLE_ROUNDS if last else FEW_ROUNDS)
     search = focal(found) if estimate_focal and camera.perspective else None
-    found = under(found, search.focal_px, finish, start) if search and search.known else finish(found)
+    found = finish(search.sheet if search and search.known else found)
     camera = found.camera if search and search.known else camera
     shapes = found.shapes()
     known = np.isfinite(shapes).all(axis=(0, 1))

@@ -1,6 +1,5 @@
 """The focal length under which a sheet keeps its lengths best."""
 
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -10,13 +9,13 @@ from reconstruction import ReconstructionError
 from reconstruction.mapping.isometric.adjustment import by_part, on_smooth_images, with_focal
 from reconstruction.mapping.isometric.lengths import robust_lengths
 from reconstruction.mapping.isometric.sheet import IsometricSheet
-from reconstruction.mapping.start import Start, at_once
 
 FACTORS = (0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8, 2.3, 3.0, 4.0)  # of the focal length that are tried first
 CLOSER = 1.05  # ... and then, by all frames, in steps of this factor
 MOST = 9  # of those
-RISE = 1.3  # times the least change of length, to which it must rise on both sides
-ALIKE = 1.02  # times the least change of length, up to which the focal length assumed so far is as good
+RISE = 1.3  # times the least change of length, to which it rises on both sides where that alone is sure
+LESS = 1.05  # times less must change than under the focal length assumed
+AGAIN = 3  # times at most a sheet is made anew
 FRAMES = 15  # those that differ most tell it roughly
 EXACT = 1e-9  # change of length that is none
 WELL = 0.003  # change of lengths: less is not to be had
@@ -29,11 +28,11 @@ class FocalSearch:
     """What a sheet says about the focal length.
 
     Attributes:
-        focal_px: under which lengths change least.
+        sheet: under that at which lengths change least.
         known: whether they change clearly more on both sides, or under the focal length assumed so far.
     """
 
-    focal_px: float
+    sheet: IsometricSheet
     known: bool
 
 
@@ -43,12 +42,32 @@ def typical_strain(sheet: IsometricSheet) -> float:
     return float(np.exp(np.log(np.maximum(change, EXACT)).mean()))
 
 
-def focal(sheet: IsometricSheet) -> FocalSearch:
-    """Focal length by the change of length: least at the true one."""
+def focal(assumed: IsometricSheet) -> FocalSearch:
+    """Focal length by the change of length: least at the true one.
+
+    A sheet made under a wrong focal length remembers it: it stays bent as it was, and lengths change least somewhere
+    between. So where another is found far off, it is made anew under that, and asked again.
+
+    Args:
+        assumed: the sheet under the focal length assumed so far.
+    """
+    rough_px, both_sides = roughly(assumed)
+    made, found = assumed, closer(with_focal(assumed, rough_px))
+    for _ in range(AGAIN):
+        if found.strain_rms < WELL or near(made, found.camera.focal_px):
+            break
+        made = found
+        found = closer(made_anew(made))
+    # A long lens shows so little perspective that a longer one changes hardly anything: the one assumed does.
+    return FocalSearch(found, both_sides or typical_strain(assumed) > LESS * typical_strain(found))
+
+
+def roughly(sheet: IsometricSheet) -> tuple[float, bool]:
+    """Focal length of least change in the frames that differ most, and whether it is clearly more on both sides."""
     tried: dict[float, float] = {}
 
-    def look(focal_px: float, start: IsometricSheet) -> IsometricSheet:
-        found = with_focal(start, focal_px)
+    def look(focal_px: float, begun: IsometricSheet) -> IsometricSheet:
+        found = with_focal(begun, focal_px)
         tried[focal_px] = typical_strain(found)
         return found
 
@@ -63,21 +82,18 @@ def focal(sheet: IsometricSheet) -> FocalSearch:
     focals = np.array(sorted(tried))
     strains = np.array([tried[focal_px] for focal_px in focals])
     k = int(strains.argmin())
-    focal_px, least = closer(sheet, float(focals[k]))
-    assumed = typical_strain(sheet)
-    # A long lens shows so little perspective that a longer one changes hardly anything: the one assumed does.
-    both_sides = min(strains[:k].max(initial=0.0), strains[k + 1 :].max(initial=0.0)) > RISE * strains[k]
-    known = 0 < k < len(focals) - 1 and (both_sides or assumed > RISE * least)
-    return FocalSearch(f if assumed < ALIKE * least else focal_px, bool(known))
+    sides = min(strains[:k].max(initial=0.0), strains[k + 1 :].max(initial=0.0))
+    return float(focals[k]), bool(sides > RISE * strains[k])
 
 
-def closer(sheet: IsometricSheet, near_px: float) -> tuple[float, float]:
-    """Focal length of least change in all frames, near another, and that change.
+def closer(made: IsometricSheet) -> IsometricSheet:
+    """The sheet under the focal length of least change in all frames, near its own.
 
     The parabola through the three least, in the logarithm of the focal length.
     """
-    found = {0: with_focal(sheet, near_px)}
-    strain = {0: typical_strain(found[0])}
+    near_px = made.camera.focal_px
+    found = {0: made}
+    strain = {0: typical_strain(made)}
     best = 0
     while len(strain) < MOST and not {best - 1, best + 1} <= strain.keys():
         for k in {best - 1, best + 1} - strain.keys():
@@ -85,34 +101,19 @@ def closer(sheet: IsometricSheet, near_px: float) -> tuple[float, float]:
             strain[k] = typical_strain(found[k])
         best = min(strain, key=strain.__getitem__)
     if not {best - 1, best + 1} <= strain.keys():
-        return float(near_px * CLOSER**best), strain[best]
+        return found[best]
     less, least, more = (strain[best + side] ** 2 for side in (-1, 0, 1))
     lowest = (less - more) / max(2 * (less - 2 * least + more), EXACT**2)
-    return float(near_px * CLOSER ** (best + np.clip(lowest, -1, 1))), strain[best]
+    return with_focal(found[best], float(near_px * CLOSER ** (best + np.clip(lowest, -1, 1))))
 
 
-def under(
-    found: IsometricSheet, focal_px: float, finish: Callable[[IsometricSheet], IsometricSheet], start: Start = at_once
-) -> IsometricSheet:
-    """A sheet under another focal length, finished; where that is far off, started anew as well: it may be folded wrongly.
-
-    Args:
-        found: the sheet under the focal length assumed so far.
-        focal_px: the other one.
-        finish: what is to be done with the sheet that keeps its lengths better.
-        start: where it is started anew, meanwhile.
-
-    Raises:
-        what `finish` raises.
-    """
-    near = with_focal(found, focal_px)
-    if near.strain_rms < WELL or max(focal_px, found.camera.focal_px) < FAR_OFF * min(focal_px, found.camera.focal_px):
-        return finish(near)
-    begun = start(on_smooth_images, found.warps, near.camera)
-    meanwhile = None if begun.done() else at_once(finish, near)
+def made_anew(found: IsometricSheet) -> IsometricSheet:
+    """The sheet that its images show without it, if that keeps its lengths better."""
     with suppress(ReconstructionError):
-        anew: IsometricSheet = begun.result()
-        if typical_strain(anew) < typical_strain(near):
-            return finish(anew)
-    sheet: IsometricSheet = meanwhile.result() if meanwhile else finish(near)
-    return sheet
+        return min(found, on_smooth_images(found.warps, found.camera), key=typical_strain)
+    return found
+
+
+def near(found: IsometricSheet, focal_px: float) -> bool:
+    """Whether a focal length is near that of a sheet."""
+    return bool(abs(np.log(focal_px / found.camera.focal_px)) < np.log(FAR_OFF))

@@ -10,7 +10,7 @@ from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.isometric.adjustment import bundled, sheet
-from reconstruction.mapping.isometric.focal import focal, under
+from reconstruction.mapping.isometric.focal import focal
 from reconstruction.mapping.isometric.one_frame import shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
@@ -125,8 +125,8 @@ def test_lengths_hold_the_focal_length(off: float) -> None:
     wrong = sheet(W, SEEN, replace(CAMERA, focal_px=off * CAMERA.focal_px))
     search = focal(wrong)
     assert search.known
-    assert search.focal_px == pytest.approx(CAMERA.focal_px, rel=0.05)
-    assert error(under(wrong, search.focal_px, lambda sheet: sheet), S) < 0.02
+    assert search.sheet.camera.focal_px == pytest.approx(CAMERA.focal_px, rel=0.05)
+    assert error(search.sheet, S) < 0.02
 
 
 def test_what_cannot_be_done_is_said() -> None:
