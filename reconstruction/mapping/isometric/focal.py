@@ -10,16 +10,16 @@ from reconstruction.mapping.isometric.adjustment import by_part, on_smooth_image
 from reconstruction.mapping.isometric.lengths import robust_lengths
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 
-FACTORS = (0.4, 0.55, 0.7, 0.85, 1.0, 1.2, 1.45, 1.8, 2.3, 3.0, 4.0)  # of the focal length that are tried first
-CLOSER = 1.05  # ... and then, by all frames, in steps of this factor
-MOST = 9  # of those
+FACTORS = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of the focal length assumed, that are tried first: lenses there are
+CLOSER = 1.075  # ... and then, by all frames, in steps of this factor
+BESIDE = 2  # of those to each side of the least change: fewer hang on single edges
+WALKS = 4  # to where lengths change less
 RISE = 1.3  # times the least change of length, to which it rises on both sides where that alone is sure
 LESS = 1.05  # times less must change than under the focal length assumed
 AGAIN = 3  # times at most a sheet is made anew
 FRAMES = 15  # those that differ most tell it roughly
 EXACT = 1e-9  # change of length that is none
 WELL = 0.003  # change of lengths: less is not to be had
-FAR_OFF = 1.15  # times another focal length
 ENOUGH = 1.1 * RISE  # ... and beyond which no focal length is tried on that side
 
 
@@ -59,7 +59,8 @@ def focal(assumed: IsometricSheet) -> FocalSearch:
         made = found
         found = closer(made_anew(made))
     # A long lens shows so little perspective that a longer one changes hardly anything: the one assumed does.
-    return FocalSearch(found, both_sides or typical_strain(assumed) > LESS * typical_strain(found))
+    less = both_sides or typical_strain(assumed) > LESS * typical_strain(found)
+    return FocalSearch(found, less and FACTORS[0] < found.camera.focal_px / assumed.camera.focal_px < FACTORS[-1])
 
 
 def roughly(sheet: IsometricSheet) -> tuple[float, bool]:
@@ -89,22 +90,20 @@ def roughly(sheet: IsometricSheet) -> tuple[float, bool]:
 def closer(made: IsometricSheet) -> IsometricSheet:
     """The sheet under the focal length of least change in all frames, near its own.
 
-    The parabola through the three least, in the logarithm of the focal length.
+    The lowest place of a parabola through the logarithm of the change, by that of the focal length.
     """
-    near_px = made.camera.focal_px
-    found = {0: made}
-    strain = {0: typical_strain(made)}
-    best = 0
-    while len(strain) < MOST and not {best - 1, best + 1} <= strain.keys():
-        for k in {best - 1, best + 1} - strain.keys():
-            found[k] = with_focal(found[best], near_px * CLOSER**k)
-            strain[k] = typical_strain(found[k])
-        best = min(strain, key=strain.__getitem__)
-    if not {best - 1, best + 1} <= strain.keys():
+    found, change = {0: made}, {0: np.log(typical_strain(made))}
+    for _ in range(WALKS):
+        best = min(change, key=change.__getitem__)
+        beside = range(best - BESIDE, best + BESIDE + 1)
+        for k in sorted(set(beside) - found.keys(), key=abs):  # outwards, each from the one before
+            found[k] = with_focal(found[k - int(np.sign(k))], made.camera.focal_px * CLOSER**k)
+            change[k] = np.log(typical_strain(found[k]))
+    bend, slope, _ = np.polyfit(beside, [change[k] for k in beside], 2)
+    if bend <= 0:
         return found[best]
-    less, least, more = (strain[best + side] ** 2 for side in (-1, 0, 1))
-    lowest = (less - more) / max(2 * (less - 2 * least + more), EXACT**2)
-    return with_focal(found[best], float(near_px * CLOSER ** (best + np.clip(lowest, -1, 1))))
+    lowest = np.clip(-slope / (2 * bend), beside[0], beside[-1])
+    return with_focal(found[best], float(made.camera.focal_px * CLOSER**lowest))
 
 
 def made_anew(found: IsometricSheet) -> IsometricSheet:
@@ -115,5 +114,5 @@ def made_anew(found: IsometricSheet) -> IsometricSheet:
 
 
 def near(found: IsometricSheet, focal_px: float) -> bool:
-    """Whether a focal length is near that of a sheet."""
-    return bool(abs(np.log(focal_px / found.camera.focal_px)) < np.log(FAR_OFF))
+    """Whether a focal length is that of a sheet, but for a step."""
+    return bool(abs(np.log(focal_px / found.camera.focal_px)) < np.log(CLOSER))
