@@ -8,7 +8,7 @@ from threadpoolctl import ThreadpoolController
 
 from modeshape.estimate import Estimate
 from reconstruction import online
-from reconstruction.camera import Camera
+from reconstruction.camera import camera_of
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Settings
 
@@ -21,7 +21,7 @@ class Reconstruction:
     Args:
         size: (width, height) of the picture, px.
         focal_px: focal length; infinite for an orthographic camera; None: found where the views hold it,
-            else the width.
+            else the longer side.
         settings: how to reconstruct.
 
     Raises:
@@ -38,8 +38,7 @@ class Reconstruction:
 
     def __init__(self, size: tuple[int, int], *, focal_px: float | None = None, settings: Settings | None = None) -> None:
         settings = replace(settings or Settings(), estimate_focal=focal_px is None)
-        camera = Camera(float(size[0]) if focal_px is None else focal_px, np.array(size) / 2)
-        self._estimator = online.Reconstruction(camera, settings)
+        self._estimator = online.Reconstruction(camera_of(size, focal_px), settings)
         self._waiting: list[NDArray[np.float64]] = []
         self._done = 0
         self._threads = ThreadpoolController()  # the matrices are small: more threads are slower

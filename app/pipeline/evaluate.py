@@ -222,6 +222,6 @@ def camera_of(config: Evaluate, tracks: Tracks) -> Camera:
     if focal is None:
         raise UsageError(f"{config.tracks} has no K: give --focal, or --camera orthographic")
     seen = np.where(tracks.visible[:, None], tracks.W, np.nan)
-    if focal == "auto":  # pictures are about as wide as what moves in them
-        focal = float(np.nanmax(seen[:, 0]) - np.nanmin(seen[:, 0]))
+    if focal == "auto":  # the picture's longer side, which is about as long as where points move
+        focal = float((np.nanmax(seen, axis=(0, 2)) - np.nanmin(seen, axis=(0, 2))).max())
     return Camera(focal, np.nanmean(seen, axis=(0, 2)))

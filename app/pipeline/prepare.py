@@ -11,7 +11,7 @@ from app.files.writing import check_outputs
 from app.options.model import Model
 from app.options.run import Run
 from app.pipeline.stages.messages import RECOVERED
-from reconstruction.camera import Camera
+from reconstruction.camera import camera_of
 from reconstruction.mapping.mapper import LATENCY, Mapper
 from reconstruction.mapping.start import Start
 from reconstruction.online import Reconstruction
@@ -39,11 +39,10 @@ def estimator(config: Run, size: tuple[int, int], points_px: Array, start: Start
     Raises:
         UsageError: a mesh that does not fit.
     """
-    width, height = size
     model = config.model
-    focal = model.focal if isinstance(model.focal, float) else float(width)
-    camera = Camera(focal if config.camera == "perspective" else np.inf, np.array([width, height]) / 2)
-    settings = settings_of(model, config.rest_shape, estimate_focal=not isinstance(model.focal, float))
+    focal_px = model.focal if isinstance(model.focal, float) else None
+    camera = camera_of(size, focal_px if config.camera == "perspective" else np.inf)
+    settings = settings_of(model, config.rest_shape, estimate_focal=focal_px is None)
     given = None
     if config.rest_shape not in RECOVERED:
         from app.files.mesh_file import rest_of_surface  # trimesh takes its time to load
