@@ -10,7 +10,7 @@ from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis import distances
 from reconstruction.basis.mesh import Mesh, ratio_of_sizes
 from reconstruction.basis.model import Model, build_model
-from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, medoid, rms_radius
+from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, medoid
 from reconstruction.camera import Camera, lens, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, sheet
 from reconstruction.mapping.isometric.bundle import FUNCTIONS
@@ -29,7 +29,6 @@ FEWEST_KEYFRAMES, FEWEST_POINTS = 6, 20
 LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
 ASSUMED = "focal length {:.0f} px assumed: give it if you know better"
 MOST_STRETCH = 0.018  # change of a sheet's lengths at the end, noise apart: of creases and cloth 1 %, else it is none
-RIGID = 0.005  # residual over the size, up to which a solid is rigid enough to hold a focal length
 
 
 @dataclass(frozen=True)
@@ -185,6 +184,7 @@ def map_of(
     focal_px = found.camera.focal_px
     assumed = np.isclose(focal_px, camera.focal_px, rtol=1e-9)
     told = ASSUMED.format(focal_px) if assumed else f"focal length {focal_px:.0f} px, from {len(W)} keyframes"
+    told += "" if assumed or found.sheet else " and what is usual"
     return replace(found, seen=visible, focal_note=told if estimate_focal and camera.perspective else "")
 
 
@@ -196,14 +196,12 @@ def through(found: IsometricSheet, W: Array) -> tuple[Array, Array]:
 def solid_map(
     W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool, known: Array | None, last: bool
 ) -> Map:
-    """The map of a solid; one that deforms holds no focal length.
+    """The map of a solid.
 
     Raises:
         ReconstructionError: there are too few points.
     """
     found = bundle_adjust(W, visible, camera, refine_focal=estimate_focal, known=known)
-    if estimate_focal and np.nanmedian(found.residual_px) > RIGID * rms_radius(found.shape):
-        found = bundle_adjust(W, visible, camera, refine_focal=False, known=known)
     rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
     modes = modes_held(W, visible, found, MOST_MODES if last else MORE_MODES)
     return Map(rest, found.camera, modes=modes, evidence=evidence)

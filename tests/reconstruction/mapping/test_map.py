@@ -133,7 +133,7 @@ def test_a_solid() -> None:
 
 
 @pytest.mark.parametrize("deforms", [False, True])
-def test_a_focal_length_that_is_only_assumed_is_told_to_be(deforms: bool) -> None:
+def test_a_solid_holds_the_focal_length_also_if_it_deforms(deforms: bool) -> None:
     rng = np.random.default_rng(3)
     swell = 1 + 0.08 * deforms * rng.normal(size=(16, 1, 1)) * np.array([[1.0], [-1.0], [1.0]])
     W, _ = seen(swell * relief(rng, 120), turns(16, 30.0), PERSPECTIVE)
@@ -141,7 +141,8 @@ def test_a_focal_length_that_is_only_assumed_is_told_to_be(deforms: bool) -> Non
     assumed = replace(PERSPECTIVE, focal_px=600.0)
     found = map_of(W, np.ones((16, 120), bool), assumed, estimate_focal=True, kind="solid")
     assert found is not None
-    assert found.focal_note.startswith("focal length 600 px assumed" if deforms else "focal length 5")
+    assert found.camera.focal_px == pytest.approx(PERSPECTIVE.focal_px, rel=0.1)
+    assert "16 keyframes and what is usual" in found.focal_note
 
 
 def test_what_it_is_may_be_told() -> None:
