@@ -29,7 +29,8 @@ class FocalSearch:
 
     Attributes:
         sheet: under that at which lengths change least.
-        known: whether they change clearly more on both sides, or under the focal length assumed so far.
+        known: whether they change clearly more on both sides, or under the focal length assumed so far, and there are such
+            lenses.
     """
 
     sheet: IsometricSheet
