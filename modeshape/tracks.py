@@ -8,7 +8,7 @@ from threadpoolctl import ThreadpoolController
 
 from modeshape.estimate import Estimate
 from reconstruction import online
-from reconstruction.camera import camera_of
+from reconstruction.camera import picture_camera
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Settings
 
@@ -38,7 +38,7 @@ class Reconstruction:
 
     def __init__(self, size: tuple[int, int], *, focal_px: float | None = None, settings: Settings | None = None) -> None:
         settings = replace(settings or Settings(), estimate_focal=focal_px is None)
-        self._estimator = online.Reconstruction(camera_of(size, focal_px), settings)
+        self._estimator = online.Reconstruction(picture_camera(size, focal_px), settings)
         self._waiting: list[NDArray[np.float64]] = []
         self._done = 0
         self._threads = ThreadpoolController()  # the matrices are small: more threads are slower

@@ -44,7 +44,7 @@ def farness(placed: Array, kappa: float) -> Array:
     return np.maximum(1 + kappa * placed[..., 2, :], NEAREST)
 
 
-def camera_of(size: tuple[int, int], focal_px: float | None = None) -> Camera:
+def picture_camera(size: tuple[int, int], focal_px: float | None = None) -> Camera:
     """The camera of a picture (width, height) px: its focal length, or that of most phones and webcams, held either way."""
     return Camera(float(max(size)) if focal_px is None else focal_px, np.array(size) / 2)
 

@@ -11,7 +11,7 @@ from app.files.writing import check_outputs
 from app.options.model import Model
 from app.options.run import Run
 from app.pipeline.stages.messages import RECOVERED
-from reconstruction.camera import camera_of
+from reconstruction.camera import picture_camera
 from reconstruction.mapping.mapper import LATENCY, Mapper
 from reconstruction.mapping.start import Start
 from reconstruction.online import Reconstruction
@@ -41,7 +41,7 @@ def estimator(config: Run, size: tuple[int, int], points_px: Array, start: Start
     """
     model = config.model
     focal_px = model.focal if isinstance(model.focal, float) else None
-    camera = camera_of(size, focal_px if config.camera == "perspective" else np.inf)
+    camera = picture_camera(size, focal_px if config.camera == "perspective" else np.inf)
     settings = settings_of(model, config.rest_shape, estimate_focal=focal_px is None)
     given = None
     if config.rest_shape not in RECOVERED:

@@ -1,7 +1,7 @@
 """What the object is, by its keyframes: which kind of thing, its rest shape, its camera, and its shape in any frame."""
 
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, m
 from reconstruction.camera import Camera, lens, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, sheet
 from reconstruction.mapping.isometric.bundle import FUNCTIONS
-from reconstruction.mapping.isometric.focal import focal
+from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.selection import Evidence, Kind, select
@@ -183,8 +183,8 @@ def map_of(
         return None
     focal_px = found.camera.focal_px
     assumed = np.isclose(focal_px, camera.focal_px, rtol=1e-9)
-    told = ASSUMED.format(focal_px) if assumed else f"focal length {focal_px:.0f} px, from {len(W)} keyframes"
-    told += "" if assumed or found.sheet else " and what is usual"
+    source = f"{len(W)} keyframes" if found.sheet else f"{len(W)} keyframes and what is usual"
+    told = ASSUMED.format(focal_px) if assumed else f"focal length {focal_px:.0f} px, from {source}"
     return replace(found, seen=visible, focal_note=told if estimate_focal and camera.perspective else "")
 
 
@@ -218,10 +218,10 @@ def sheet_map(
     last: bool,
 ) -> Map:
     """The map of a sheet: its rest shape is the one given, else the keyframe's shape that is nearest to all others."""
-    finish = partial(bundled, W=W, rounds=BUNDLE_ROUNDS if last else FEW_ROUNDS)
-    search = focal(found) if estimate_focal and camera.perspective else None
-    found = finish(search.sheet if search and search.known else found)
-    camera = found.camera if search and search.known else camera
+    if camera.perspective:
+        found = under_its_focal_length(found) if estimate_focal else found
+        camera = found.camera
+    found = bundled(found, W, BUNDLE_ROUNDS if last else FEW_ROUNDS)
     shapes = found.shapes()
     known = np.isfinite(shapes).all(axis=(0, 1))
     middle = medoid(shapes[:, :, known])

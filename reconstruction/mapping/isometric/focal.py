@@ -1,7 +1,6 @@
 """The focal length under which a sheet keeps its lengths best."""
 
 from contextlib import suppress
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,28 +22,17 @@ WELL = 0.003  # change of lengths: less is not to be had
 ENOUGH = 1.1 * RISE  # ... and beyond which no focal length is tried on that side
 
 
-@dataclass(frozen=True)
-class FocalSearch:
-    """What a sheet says about the focal length.
-
-    Attributes:
-        sheet: under that at which lengths change least.
-        known: whether they change clearly more on both sides, or under the focal length assumed so far, and there are such
-            lenses.
-    """
-
-    sheet: IsometricSheet
-    known: bool
-
-
 def typical_strain(sheet: IsometricSheet) -> float:
     """Change of length of the typical edge: the geometric mean, so that the few that are on no sheet do not decide."""
     change = robust_lengths(sheet.edges, sheet.edges.log_lengths(sheet.coefficients))[2]
     return float(np.exp(np.log(np.maximum(change, EXACT)).mean()))
 
 
-def focal(assumed: IsometricSheet) -> FocalSearch:
-    """Focal length by the change of length: least at the true one.
+def under_its_focal_length(assumed: IsometricSheet) -> IsometricSheet:
+    """The sheet under the focal length at which its lengths change least, or as it is where they do not tell.
+
+    They tell where they change clearly more on both sides, or under the focal length assumed so far, and there are such
+    lenses.
 
     A sheet made under a wrong focal length remembers it: it stays bent as it was, and lengths change least somewhere
     between. So where another is found far off, it is made anew under that, and asked again.
@@ -55,13 +43,14 @@ def focal(assumed: IsometricSheet) -> FocalSearch:
     rough_px, both_sides = roughly(assumed)
     made, found = assumed, closer(with_focal(assumed, rough_px))
     for _ in range(AGAIN):
-        if found.strain_rms < WELL or near(made, found.camera.focal_px):
+        if found.strain_rms < WELL or near(made, found):
             break
         made = found
         found = closer(made_anew(made))
     # A long lens shows so little perspective that a longer one changes hardly anything: the one assumed does.
     less = both_sides or typical_strain(assumed) > LESS * typical_strain(found)
-    return FocalSearch(found, less and FACTORS[0] < found.camera.focal_px / assumed.camera.focal_px < FACTORS[-1])
+    known = less and FACTORS[0] < found.camera.focal_px / assumed.camera.focal_px < FACTORS[-1]
+    return found if known else assumed
 
 
 def roughly(sheet: IsometricSheet) -> tuple[float, bool]:
@@ -114,6 +103,6 @@ def made_anew(found: IsometricSheet) -> IsometricSheet:
     return found
 
 
-def near(found: IsometricSheet, focal_px: float) -> bool:
-    """Whether a focal length is that of a sheet, but for a step."""
-    return bool(abs(np.log(focal_px / found.camera.focal_px)) < np.log(CLOSER))
+def near(one: IsometricSheet, other: IsometricSheet) -> bool:
+    """Whether the focal lengths of two sheets are alike, but for a step."""
+    return bool(abs(np.log(one.camera.focal_px / other.camera.focal_px)) < np.log(CLOSER))

@@ -145,6 +145,15 @@ def test_a_solid_holds_the_focal_length_also_if_it_deforms(deforms: bool) -> Non
     assert "16 keyframes and what is usual" in found.focal_note
 
 
+def test_a_focal_length_that_is_only_assumed_is_told_to_be() -> None:
+    W, _, _ = waving()
+    no_lens = replace(CAMERA, focal_px=6 * CAMERA.focal_px)  # what lengths ask for is out of the range of those there are
+    found = map_of(W[::2], np.ones((FRAMES // 2, POINTS), bool), no_lens, estimate_focal=True, kind="sheet")
+    assert found is not None
+    assert found.camera.focal_px == no_lens.focal_px
+    assert found.focal_note.startswith(f"focal length {no_lens.focal_px:.0f} px assumed")
+
+
 def test_what_it_is_may_be_told() -> None:
     W, _, _ = waving()
     found = map_of(W[::2], np.ones((FRAMES // 2, POINTS), bool), CAMERA, estimate_focal=False, kind="solid")
