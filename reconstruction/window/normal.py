@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dpotri
 
 from reconstruction.arrays import Array
 
@@ -33,3 +34,16 @@ class Normal:
 def diagonals(blocks: Array) -> Array:
     """The diagonals (n, d) of blocks (n, d, d), to be changed in place."""
     return np.einsum("nii->ni", blocks)
+
+
+def inverted(matrix: Array) -> Array:
+    """The inverse of a symmetric positive definite matrix.
+
+    Raises:
+        LinAlgError: it is not.
+    """
+    factor, failed = dpotrf(matrix, lower=1)
+    if failed:
+        raise np.linalg.LinAlgError("not positive definite")
+    inverse = np.tril(dpotri(factor, lower=1)[0])
+    return np.asarray(inverse + np.tril(inverse, -1).T)

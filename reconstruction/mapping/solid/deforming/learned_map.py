@@ -10,7 +10,8 @@ from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import rotation_from_quaternion
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.bundle import seen_by
-from reconstruction.mapping.solid.deforming.deformations import POINTS, Learned, learned
+from reconstruction.mapping.solid.deforming.deformations import Learned
+from reconstruction.mapping.solid.deforming.learning import POINTS, learned
 from reconstruction.mapping.solid.placing import well_spread
 from reconstruction.settings import MOST_MODES, Settings
 from reconstruction.state import State, join

@@ -12,11 +12,12 @@ from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.deforming import learned_map
-from reconstruction.mapping.solid.deforming.deformations import POINTS, inverted, learned
 from reconstruction.mapping.solid.deforming.learned_map import followed, with_deformations
+from reconstruction.mapping.solid.deforming.learning import POINTS, learned
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import MOST_MODES, Settings
 from reconstruction.state import State
+from reconstruction.window.normal import inverted
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
 
 K, P = 30, 150

@@ -1,0 +1,165 @@
+"""Which deformations a solid shows, learned from its keyframes: a Gaussian of Λ', by expectation maximisation.
+
+An image says nothing about depth. But a face opens its mouth again and again, seen from here and from there: which
+coefficients go together, and how far, tells of every frame what its image leaves open. Torresani, Hertzmann and Bregler
+(PAMI 2008) found this for points that are free to move; here it is done in the space of the paper's modes, and in
+perspective.
+
+Given the Gaussian, pose and Λ' of a frame are a Gauss-Newton step on the sums over its points (`window.statistics`), and
+the covariance of Λ' is a block of the inverse of its normal matrix. Given those of all frames, the Gaussian has the second
+moments that they have, and the rest shape, free in every point, is what suits all images best. Depth comes to light slowly
+so, in hundreds of rounds; every two of them tell where they lead to (`acceleration`).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.basis.constraints import ALL_ROWS
+from reconstruction.basis.model import Model
+from reconstruction.mapping.solid.building import TAIL_SIGMAS
+from reconstruction.mapping.solid.bundle import Loss
+from reconstruction.mapping.solid.deforming.acceleration import extrapolated
+from reconstruction.mapping.solid.deforming.deformations import Deformations, Learned
+from reconstruction.mapping.solid.placing import well_spread
+from reconstruction.mapping.solid.spikes import without_new_spikes
+from reconstruction.state import POSE, State
+from reconstruction.window.normal import inverted
+from reconstruction.window.robust import deviation, lengths
+from reconstruction.window.statistics import Statistics, frame_statistics, residuals, stack
+from reconstruction.window.terms import data_normal
+
+ROUNDS = 40
+POINTS = 400  # by which it is learned: dense ones are placed afterwards
+BELIEVED = 2.0  # keyframes' worth of a Gaussian in which only the modes differ, by their eigenvalues
+SCALE = 0.02  # deviation of log s from where it was at first: what comes nearer may as well swell
+LEAST_NOISE = 5e-3  # of the size: neighbours' errors are alike, and what is believed of them goes into depth
+LOOSE = 1e-3  # pull of a point of the rest shape to where it was, of what images say about it
+
+
+def learned(model: Model, W: Array, visible: Mask, state: State, rounds: int = ROUNDS) -> Learned:
+    """The Gaussian, and the rest shape about which it is, from where a window has found the keyframes to be.
+
+    Args:
+        model: a solid with its modes.
+        W: (K, 2, p) px; finite.
+        visible: (K, p).
+        state: pose and Λ' of each (n = K).
+        rounds: of expectation and maximisation.
+
+    Raises:
+        LinAlgError: no Gaussian holds the points.
+    """
+    seen, some = model.normalised(W), well_spread(model.B[:3], visible, POINTS)
+    learning = ExpectationMaximisation(model, some, seen[:, :, some], visible[:, some], state.log_s)
+    path = [learning.begun(model.B, state)]
+    for k in range(1, rounds + 1):
+        path.append(learning.round(path[-1]))
+        if len(path) == 3:
+            path = [extrapolated(*path) if k < rounds - 1 else path[-1]]
+    found = path[-1]
+    B = found.B.copy()
+    if len(some) < B.shape[1]:
+        off = residuals(B, seen, found.state.matrices(), model.focal)
+        h = visible * robust(found.deformations.noise).weight((off**2).sum(axis=1))
+        B[:3] += shifts(seen, off, h, found.state, model.focal)
+    B[:3] = without_new_spikes(B[:3], model.B[:3], visible)
+    return replace(found, B=B)
+
+
+class ExpectationMaximisation:
+    """Rounds that make keyframes likelier.
+
+    Args:
+        model: a solid with its modes.
+        some: (n,) points of it that are looked at.
+        seen: (K, 2, n) where, in units of the shape's size; finite.
+        visible: (K, n).
+        log_s: (K,) to which scales are held.
+    """
+
+    def __init__(self, model: Model, some: Indices, seen: Array, visible: Mask, log_s: Array) -> None:
+        self._some, self._seen, self._visible, self._focal, self._log_s = some, seen, visible, model.focal, log_s
+        alike = np.tile(model.basis.eigenvalues**0.5, 3)
+        self._believed = np.diag(alike / alike.sum())
+
+    def begun(self, B: Array, state: State) -> Learned:
+        """What keyframes tell by where they are, with the basis B (4 + r, p)."""
+        off = residuals(B[:, self._some], self._seen, state.matrices(), self._focal)
+        noise = deviation(lengths(off)[self._visible], LEAST_NOISE)
+        return self._maximised(B, state, np.zeros_like(self._believed), noise, 0.0)
+
+    def round(self, known: Learned) -> Learned:
+        """Noise and rest shape by pose and Λ', these by the Gaussian, and that by them."""
+        B, state, noise = known.B.copy(), known.state, known.deformations.noise
+        off = residuals(B[:, self._some], self._seen, state.matrices(), self._focal)
+        squares = (off**2).sum(axis=1)
+        h = self._visible * robust(noise).weight(squares)
+        total = (h * squares).sum() + len(state) * known.taken * noise**2
+        noise = max(float(np.sqrt(total / (2 * h.sum()))), LEAST_NOISE)
+        B[:3, self._some] += shifts(self._seen, off, h, state, self._focal)
+        frames = zip(self._seen, h, strict=True)
+        data = stack([frame_statistics(B[:, self._some], one, weight, self._focal) for one, weight in frames])
+        precision = inverted(known.deformations.covariance)
+        state, unsure, taken = expected(data, state, precision, noise**2 / len(self._some), self._log_s)
+        return self._maximised(B, state, unsure, noise, taken)
+
+    def _maximised(self, B: Array, state: State, unsure: Array, noise: float, taken: float) -> Learned:
+        """The Gaussian of frames whose Λ' has the mean covariance `unsure`, about the mean of their shapes."""
+        K, mean = len(state), state.Lambda.mean(axis=0)
+        B = np.concatenate([B[:3] + mean @ B[3:-1], B[3:]])
+        state = replace(state, Lambda=state.Lambda - mean)
+        Lambda = state.Lambda.reshape(K, -1)
+        moments = Lambda.T @ Lambda / K + unsure
+        covariance = (K * moments + BELIEVED * np.trace(moments) * self._believed) / (K + BELIEVED)
+        return Learned(B, state, Deformations(covariance, noise), taken)
+
+
+def robust(noise: float) -> Loss:
+    """The loss of residuals with that deviation."""
+    return Loss(TAIL_SIGMAS * noise, redescending=True)
+
+
+def expected(data: Statistics, state: State, precision: Array, variance: float, log_s: Array) -> tuple[State, Array, float]:
+    """Pose and Λ' after a step; mean covariance (3r, 3r) of Λ', and mean number of parameters that the images hold.
+
+    Args:
+        data: of n frames.
+        state: where these are.
+        precision: (3r, 3r) of Λ'.
+        variance: of the mean of a coordinate over the points.
+        log_s: (n,) to which it is held.
+    """
+    n, r3 = len(state), len(precision)
+    normal = data_normal(data, state)
+    H, g = normal.diagonal / variance, normal.gradient / variance
+    H[:, POSE:, POSE:] += precision
+    g[:, POSE:] += state.Lambda.reshape(n, r3) @ precision
+    H[:, POSE - 1, POSE - 1] += SCALE**-2
+    g[:, POSE - 1] += (state.log_s - log_s) / SCALE**2
+    covariance, step, taken = np.zeros((r3, r3)), np.zeros_like(g), 0.0
+    for k in range(n):
+        inverse = inverted(H[k])
+        step[k] = -inverse @ g[k]
+        covariance += inverse[POSE:, POSE:] / n
+        taken += float((inverse * normal.diagonal[k]).sum()) / variance / n
+    return state.moved(step, ALL_ROWS), covariance, taken
+
+
+def shifts(seen: Array, off: Array, h: Array, state: State, focal: float) -> Array:
+    """Of the rest shape's points (3, p), poses and deformations known, by linear least squares.
+
+    Args:
+        seen: (K, 2, p) in units of the shape's size,
+        off: (K, 2, p) its residuals,
+        h: (K, p) and their weights.
+        state: pose and Λ' (n = K).
+        focal: in the same units.
+    """
+    A = state.scaled_rotations()
+    rows = A[:, :2, :, None] - seen[:, :, None] / focal * A[:, 2:, :, None]  # (K, 2, 3, p)
+    normal = np.einsum("kp,kuap,kubp->pab", h, rows, rows, optimize=True)
+    right = np.einsum("kp,kuap,kup->pa", h, rows, off, optimize=True)
+    loose = (LOOSE * np.trace(normal, axis1=1, axis2=2) + np.finfo(float).tiny ** 0.5)[:, None, None] * np.eye(3)
+    return np.asarray(np.linalg.solve(normal + loose, right[:, :, None])[:, :, 0].T)
