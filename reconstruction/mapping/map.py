@@ -142,7 +142,7 @@ def map_of(
     start: Start = at_once,
     given: RestShape | None = None,
     kind: Kind | None = None,
-    last: bool = False,
+    last: tuple[Array, Mask] | None = None,
 ) -> Map | None:
     """What keyframes W (K, 2, p) px with visibility (K, p) show, most different ones first; None where they do not tell.
 
@@ -155,7 +155,8 @@ def map_of(
         start: where a part of the work is done, meanwhile.
         given: a rest shape from elsewhere, which stays. Keyframes of anything but a sheet in perspective add nothing to it.
         kind: what it is, if that is known; its evidence is what keyframes say all the same.
-        last: whether there will be no other, so that time may be spent on it.
+        last: more keyframes and their visibility, by which a solid is made, if there will be no other map, so that time
+            may be spent on it.
     """
     if len(W) < FEWEST_KEYFRAMES or (given is not None and not camera.perspective):
         return None
@@ -172,20 +173,21 @@ def map_of(
         made = kind or evidence.kind
         if made == "flat" or (given is not None and made != "sheet"):
             return None
-        found = None
+        found, by, patient = None, (W, visible), last is not None
         if made == "sheet":
-            found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=last)
+            found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=patient)
             if kind is None and given is None and found.sheet and found.sheet.strain_beyond_noise > MOST_STRETCH:
                 found, evidence = None, replace(evidence, kind="solid")
         if found is None:
-            found = solid_map(W, visible, camera, evidence, estimate_focal=estimate_focal, known=known, last=last)
+            by = last or by
+            found = solid_map(*by, camera, evidence, estimate_focal=estimate_focal, known=known, last=patient)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
     focal_px = found.camera.focal_px
     assumed = np.isclose(focal_px, camera.focal_px, rtol=1e-9)
-    source = f"{len(W)} keyframes" if found.sheet else f"{len(W)} keyframes and what is usual"
+    source = f"{len(by[0])} keyframes" if found.sheet else f"{len(by[0])} keyframes and what is usual"
     told = ASSUMED.format(focal_px) if assumed else f"focal length {focal_px:.0f} px, from {source}"
-    return replace(found, seen=visible, focal_note=told if estimate_focal and camera.perspective else "")
+    return replace(found, seen=by[1], focal_note=told if estimate_focal and camera.perspective else "")
 
 
 def through(found: IsometricSheet, W: Array) -> tuple[Array, Array]:

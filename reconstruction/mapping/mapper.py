@@ -10,7 +10,7 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.mapping.bootstrap import bootstrap
-from reconstruction.mapping.keyframes import Keyframes, difference
+from reconstruction.mapping.keyframes import KEYFRAMES, Keyframes, difference
 from reconstruction.mapping.map import Map, map_of
 from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations
@@ -20,6 +20,7 @@ from reconstruction.settings import FIRST_LOOKS, Settings
 LATENCY = 90  # frames after which a map that another process makes is in force: three seconds of most videos
 FIRST_LATENCY = 0.25  # the same of a first model, of the frames it is made of: it takes a fraction of the time
 FEWEST = 10  # keyframes for a map
+MORE = 2  # times as many keyframes of a solid at the end: what deforms must be seen from many sides
 FEWEST_POINTS = 4  # that a frame shows, for a first model
 GROWN = 1.3  # times as far apart as at the last map the keyframes are before there is another,
 RENEWED = 4 / 3  # or so many times as many frames have been keyframes
@@ -64,7 +65,9 @@ class Mapper:
         self._frames = np.inf if frames is None else frames
         self._given = given
         refined = settings.refine_rest and settings.deformation in ("auto", "inextensible")
-        self._keyframes = Keyframes() if settings.maps and (given is None or refined) else None
+        mapped = settings.maps and (given is None or refined)
+        self._keyframes = Keyframes() if mapped else None
+        self._more_keyframes = Keyframes(MORE * KEYFRAMES) if mapped and given is None else None
         self._frame = -1
         # Frames, until they have given the first model.
         self._first: list[tuple[Array, Mask]] | None = [] if given is None else None
@@ -95,6 +98,8 @@ class Mapper:
             self._begin = begin
         if self._keyframes is not None:
             self._keyframes.offer(self._frame, W, visible)
+        if self._more_keyframes is not None:
+            self._more_keyframes.offer(self._frame, W, visible)
         if self._first is not None:
             if visible.sum() >= FEWEST_POINTS:
                 self._first.append((W, visible))
@@ -122,11 +127,12 @@ class Mapper:
         """The map of the keyframes of all frames, posed first as in the first frame; None if they do not tell."""
         if self._keyframes is None or not self._keyframes.frames:
             return None
-        W, visible, frames = self._keyframes.spread()
+        W, visible, _ = self._keyframes.spread()
+        more = (self._more_keyframes or self._keyframes).spread()
         asked = camera, self._settings.estimate_focal, self._known, self.start, self._given, self._settings.kind
-        found = map_of(W, visible, *asked, last=True)
+        found = map_of(W, visible, *asked, last=more[:2])
         if found is not None and found.sheet is None:
-            found = with_deformations(found, self._settings, W, visible, frames)
+            found = with_deformations(found, self._settings, *more)
         found = found or self._found
         return found and self._begin and nearest_first(found, *self._begin)
 

@@ -42,8 +42,22 @@ def inverted(matrix: Array) -> Array:
     Raises:
         LinAlgError: it is not.
     """
-    factor, failed = dpotrf(matrix, lower=1)
+    return from_lower(dpotri(cholesky(matrix), lower=1)[0])
+
+
+def cholesky(matrix: Array) -> Array:
+    """Its lower Cholesky factor, anything above the diagonal.
+
+    Raises:
+        LinAlgError: it is not positive definite.
+    """
+    factor, failed = dpotrf(matrix.T, lower=1, clean=0)  # LAPACK's order of a symmetric one: it is not turned
     if failed:
         raise np.linalg.LinAlgError("not positive definite")
-    inverse = np.tril(dpotri(factor, lower=1)[0])
-    return np.asarray(inverse + np.tril(inverse, -1).T)
+    return np.asarray(factor)
+
+
+def from_lower(matrix: Array) -> Array:
+    """The symmetric matrix of which this is the lower half."""
+    lower = np.tril(matrix)
+    return np.asarray(lower + np.tril(lower, -1).T)

@@ -14,6 +14,7 @@ so, in hundreds of rounds; every two of them tell where they lead to (`accelerat
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg.lapack import dpotri, dpotrs
 
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.constraints import ALL_ROWS
@@ -25,7 +26,7 @@ from reconstruction.mapping.solid.deforming.deformations import Deformations, Le
 from reconstruction.mapping.solid.placing import well_spread
 from reconstruction.mapping.solid.spikes import without_new_spikes
 from reconstruction.state import POSE, State
-from reconstruction.window.normal import inverted
+from reconstruction.window.normal import cholesky, from_lower, inverted
 from reconstruction.window.robust import deviation, lengths
 from reconstruction.window.statistics import Statistics, frame_statistics, residuals, stack
 from reconstruction.window.terms import data_normal
@@ -138,13 +139,14 @@ def expected(data: Statistics, state: State, precision: Array, variance: float, 
     g[:, POSE:] += state.Lambda.reshape(n, r3) @ precision
     H[:, POSE - 1, POSE - 1] += SCALE**-2
     g[:, POSE - 1] += (state.log_s - log_s) / SCALE**2
-    covariance, step, taken = np.zeros((r3, r3)), np.zeros_like(g), 0.0
+    total, step = np.zeros((POSE + r3, POSE + r3)), np.zeros_like(g)
     for k in range(n):
-        inverse = inverted(H[k])
-        step[k] = -inverse @ g[k]
-        covariance += inverse[POSE:, POSE:] / n
-        taken += float((inverse * normal.diagonal[k]).sum()) / variance / n
-    return state.moved(step, ALL_ROWS), covariance, taken
+        factor = cholesky(H[k])
+        step[k] = -dpotrs(factor, g[k], lower=1)[0]
+        total += dpotri(factor, lower=1)[0]
+    inverse = from_lower(total) / n
+    held = (inverse[POSE:, POSE:] * precision).sum() + inverse[POSE - 1, POSE - 1] / SCALE**2  # by what is known beforehand
+    return state.moved(step, ALL_ROWS), inverse[POSE:, POSE:], POSE + r3 - float(held)
 
 
 def shifts(seen: Array, off: Array, h: Array, state: State, focal: float) -> Array:
