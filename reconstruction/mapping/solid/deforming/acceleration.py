@@ -42,7 +42,8 @@ def extrapolated(before: Learned, once: Learned, twice: Learned) -> Learned:
 def step(state: State, to: State) -> Array:
     """The step (n, d) from one state to another, which is near."""
     turned = quaternion_product(state.q * CONJUGATE, to.q)
-    theta = 2 * np.sign(turned[:, :1]) * turned[:, 1:]
+    sine = np.linalg.norm(turned[:, 1:], axis=1, keepdims=True)
+    theta = 2 * np.arctan(sine / turned[:, :1]) / np.maximum(sine, 1e-300) * turned[:, 1:]
     moved = to.t - state.t, (to.log_s - state.log_s)[:, None], (to.Lambda - state.Lambda).reshape(len(to), -1)
     return np.concatenate([theta, *moved], axis=1)
 

@@ -11,7 +11,7 @@ from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.solid.deforming import learned_map
+from reconstruction.mapping.solid.deforming import learned_map, learning
 from reconstruction.mapping.solid.deforming.learned_map import followed, with_deformations
 from reconstruction.mapping.solid.deforming.learning import POINTS, learned
 from reconstruction.mapping.solid.solid import bundle_adjust
@@ -57,6 +57,18 @@ def test_depth_of_deformations_is_learned(camera: Camera) -> None:
     after = learned(model, W, visible, before)
     errors = [e3d(turned(B, state), shapes).mean() for B, state in ((model.B, before), (after.B, after.state))]
     assert errors[1] < 0.75 * errors[0]
+
+
+def test_it_takes_fewer_rounds_since_two_tell_where_they_lead_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    shapes, W, visible = keyframes(0.06)
+    found = mapped(W, visible, PERSPECTIVE)
+    model = replace(found, modes=MOST_MODES).modelled(Settings())
+    before = followed(model, Settings(), found.rest.motion, W, visible)
+    quick = learned(model, W, visible, before, rounds=16)
+    monkeypatch.setattr(learning, "extrapolated", lambda *path: path[-1])
+    slow = learned(model, W, visible, before, rounds=16)
+    errors = [e3d(turned(known.B, known.state), shapes).mean() for known in (quick, slow)]
+    assert errors[0] < 0.9 * errors[1]
 
 
 def test_dense_points_are_placed_by_those_they_are_learned_from() -> None:
