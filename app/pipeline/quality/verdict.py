@@ -39,7 +39,7 @@ TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 # turn: as much its depth may be off, and more.
 FAIR_DEPTH, POOR_DEPTH = 0.0125, 0.045
 FAIR_CHANGE = 0.028  # the same with noise, over the radius alone: what changes is no longer small
-OFTEN, MOST_RARE = 3, 0.03  # keyframes that must show a point of a solid, and share of those that fewer show
+OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 RECOVERED = ("rigid", "plane")  # by the first frames
@@ -210,7 +210,7 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
     if found.rest.kind == "rigid":
         yield from of_solid(found.rest.motion, found.evidence)
-        rare = 0.0 if found.seen is None else float((found.seen.sum(axis=0) < OFTEN).mean())
+        rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
         if rare > MOST_RARE:
             yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
     if found.sheet is not None:

@@ -35,7 +35,7 @@ ROUNDS = 40
 POINTS = 400  # by which it is learned: dense ones are placed afterwards
 BELIEVED = 2.0  # keyframes' worth of a Gaussian in which only the modes differ, by their eigenvalues
 SCALE = 0.02  # deviation of log s from where it was at first: what comes nearer may as well swell
-LEAST_NOISE = 5e-3  # of the size: neighbours' errors are alike, and what is believed of them goes into depth
+LEAST_NOISE = 7.5e-3  # of the size: neighbours' errors are alike, and what is believed of them goes into depth
 LOOSE = 1e-3  # pull of a point of the rest shape to where it was, of what images say about it
 
 
