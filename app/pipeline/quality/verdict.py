@@ -34,11 +34,12 @@ FAIR_SHARE, POOR_SHARE = 0.5, 0.3
 MOST_STRETCH = 0.0042
 FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
+POOR_LENGTHS = 0.07  # change of them from half to half of the keyframes: sheets have up to 4.5 %, things with limbs 8 %
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
-# What a solid that does not deform leaves over and neighbours share, which is no noise, over its radius and the sine of its
-# turn: as much its depth may be off, and more.
+# What a rigid shape leaves over and neighbours share, which is no noise, over its radius and the sine of its turn: as much
+# its depth may be off, and more.
 FAIR_DEPTH, POOR_DEPTH = 0.0125, 0.045
-FAIR_CHANGE = 0.028  # the same with noise, over the radius alone: what changes is no longer small
+FAIR_CHANGE, POOR_CHANGE = 0.028, 0.05  # the same with noise, over the radius alone: what changes is no longer small
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
@@ -194,17 +195,15 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         yield Verdict("fair", f"known by {count} points: what it does between them is a guess; follow more")
     if found.evidence is None:
         if found.rest.kind in RECOVERED and not known:
-            yield Verdict(
-                "fair",
-                "only the first frames say what it is, depth may be a guess; film it turning or bending more, from near by",
-            )
+            told = "only the first frames say what it is, depth may be a guess"
+            yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
         if found.rest.kind not in RECOVERED and found.rest.flat and not found.camera.perspective:
             yield MIRRORED
         return
     made, says = BY_KEYFRAMES.get(found.rest.kind), found.evidence.kind
     if made not in (None, says):
-        grade: Grade = "poor" if found.evidence.sureness > PLAIN else "fair"
-        yield Verdict(grade, f"keyframes say that it is {says if says == 'flat' else 'a ' + says}, not a {made}")
+        surely: Grade = "poor" if found.evidence.sureness > PLAIN else "fair"
+        yield Verdict(surely, f"keyframes say that it is {says if says == 'flat' else 'a ' + says}, not a {made}")
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
@@ -214,7 +213,7 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         if rare > MOST_RARE:
             yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
     if found.sheet is not None:
-        yield from of_sheet(found.sheet, perspective=found.camera.perspective)
+        yield from of_sheet(found.sheet, found.evidence, perspective=found.camera.perspective)
 
 
 def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
@@ -225,14 +224,14 @@ def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
     told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
     depth = np.sqrt(max(whole**2 - edges**2, 0.0)) / np.sin(np.radians(np.clip(turn, 1.0, 90.0)))
     if depth > FAIR_DEPTH or whole > FAIR_CHANGE:
-        yield Verdict("poor" if depth > POOR_DEPTH else "fair", f"{told}; film it turning more")
+        yield Verdict("poor" if depth > POOR_DEPTH or whole > POOR_CHANGE else "fair", f"{told}; film it turning more")
     deep, half = relief(motion.shape), evidence.relief
     if max(deep, half) > OTHERWISE_DEEP * min(deep, half):
         told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"
         yield Verdict("fair", f"{told}; film it turning more")
 
 
-def of_sheet(found: IsometricSheet, *, perspective: bool) -> Iterator[Verdict]:
+def of_sheet(found: IsometricSheet, evidence: Evidence, *, perspective: bool) -> Iterator[Verdict]:
     """What a sheet's lengths, points and camera say."""
     if not perspective:
         yield MIRRORED
@@ -241,6 +240,11 @@ def of_sheet(found: IsometricSheet, *, perspective: bool) -> Iterator[Verdict]:
         yield Verdict("fair", f"a sheet by {count} points a frame: what it does between them is a guess; follow more")
     if found.strain_rms > POOR_STRAIN:
         yield Verdict("poor", f"its lengths change by {found.strain_rms:.1%}: no shapes have been found that keep them")
+    elif evidence.length_change > POOR_LENGTHS:
+        told = f"its lengths differ by {evidence.length_change:.0%} from half to half of the keyframes"
+        yield Verdict(
+            "poor", f"{told}: it may be no sheet, or it is lost in noise; draw the region tightly, film it sharper"
+        )
     elif found.stretch > MOST_STRETCH:
         why = f"its lengths change by {found.stretch:.1%}: it stretches, has creases, or fine folds"
         yield Verdict("fair", f"{why}; if it is a solid: --rest-shape solid")

@@ -86,9 +86,10 @@ def test_what_may_as_well_be_something_else() -> None:
 @pytest.mark.parametrize(
     ("whole_px", "edges_px", "turn_degrees", "grade"),
     [(1.5, 0.5, 60.0, "fair"), (1.5, 0.5, 5.0, "poor"), (0.5, 0.2, 60.0, "good"), (0.5, 0.2, 12.0, "fair"),
-     (1.5, 1.5, 20.0, "good"), (3.0, 3.0, 60.0, "fair"), (1.9, 0.5, 60.0, "fair"), (1.9, 0.5, 30.0, "poor")],
+     (1.5, 1.5, 20.0, "good"), (2.5, 2.5, 60.0, "fair"), (1.9, 0.5, 60.0, "fair"), (1.9, 0.5, 30.0, "poor"),
+     (4.6, 4.0, 60.0, "poor")],
     ids=["changes", "and hardly turns", "hardly changes", "nor turns", "noise", "much of it", "changes much",
-         "and turns less"],
+         "and turns less", "is no solid"],
 )  # fmt: skip
 def test_the_depth_of_a_solid_that_changes(whole_px: float, edges_px: float, turn_degrees: float, grade: str) -> None:
     seen = replace(EVIDENCE, solid=Misfit(edges_px, whole_px), turn_degrees=turn_degrees)
@@ -135,6 +136,22 @@ def test_a_sheet_by_its_lengths_points_and_camera(sheet: Sheet, focal_px: float,
     said = verdict(course([0.003] * 50), found)
     assert said.grade == grade
     assert says in said.reason
+
+
+@pytest.mark.parametrize(("change", "grade"), [(0.045, "good"), (0.08, "poor")])
+def test_a_sheet_has_the_same_lengths_by_either_half_of_the_keyframes(change: float, grade: str) -> None:
+    evidence = replace(EVIDENCE, kind="sheet", length_change=change)
+    found = Map(replace(REST, kind="isometric"), Camera(500.0), cast(IsometricSheet, Sheet()), evidence=evidence)
+    said = verdict(course([0.003] * 50), found)
+    assert said.grade == grade
+    assert ("half to half" in said.reason) == (grade == "poor")
+
+
+@pytest.mark.parametrize(("keyframes", "grade"), [(30, "good"), (60, "fair")])
+def test_points_that_few_keyframes_show_have_no_place(keyframes: int, grade: str) -> None:
+    seen = np.ones((keyframes, 27), bool)
+    seen[4:, :2] = False  # four are an eighth of thirty, a fifteenth of sixty
+    assert verdict(course([0.003] * 50), replace(SOLID, seen=seen)).grade == grade
 
 
 @pytest.mark.parametrize(("share", "grade"), [(0.9, "good"), (0.4, "fair"), (0.2, "poor")])
