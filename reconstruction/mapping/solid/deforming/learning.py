@@ -7,8 +7,8 @@ perspective.
 
 Given the Gaussian, pose and Λ' of a frame are a Gauss-Newton step on the sums over its points (`window.statistics`), and
 the covariance of Λ' is a block of the inverse of its normal matrix. Given those of all frames, the Gaussian has the second
-moments that they have, and the rest shape, free in every point, is what suits all images best. Depth comes to light slowly
-so, in hundreds of rounds; every two of them tell where they lead to (`acceleration`).
+moments that they have, and the rest shape, free in every point, is what suits all images best. Depth comes to light
+in hundreds of such rounds; every two of them tell where they lead to (`acceleration`).
 """
 
 from dataclasses import replace
