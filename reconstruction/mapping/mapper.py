@@ -67,7 +67,7 @@ class Mapper:
         refined = settings.refine_rest and settings.deformation in ("auto", "inextensible")
         mapped = settings.maps and (given is None or refined)
         self._keyframes = Keyframes() if mapped else None
-        self._more_keyframes = Keyframes(MORE * KEYFRAMES) if mapped and given is None else None
+        self._more_keyframes = Keyframes(MORE * KEYFRAMES) if mapped and given is None and not live else None
         self._frame = -1
         # Frames, until they have given the first model.
         self._first: list[tuple[Array, Mask]] | None = [] if given is None else None

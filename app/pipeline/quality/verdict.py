@@ -202,8 +202,8 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         return
     made, says = BY_KEYFRAMES.get(found.rest.kind), found.evidence.kind
     if made not in (None, says):
-        surely: Grade = "poor" if found.evidence.sureness > PLAIN else "fair"
-        yield Verdict(surely, f"keyframes say that it is {says if says == 'flat' else 'a ' + says}, not a {made}")
+        grade: Grade = "poor" if found.evidence.sureness > PLAIN else "fair"
+        yield Verdict(grade, f"keyframes say that it is {says if says == 'flat' else 'a ' + says}, not a {made}")
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")

@@ -15,7 +15,7 @@ from reconstruction.mapping.solid.deforming.deformations import Deformations, Le
 from reconstruction.state import State
 
 LONGEST = 8.0  # times a round's step, at most
-CHANGED = 0.3, 4.0  # times what a variance was, at most
+CHANGED = 0.3, 4.0  # times what a variance was, at least and at most
 
 
 def extrapolated(before: Learned, once: Learned, twice: Learned) -> Learned:
