@@ -1,6 +1,7 @@
 """The on-line estimator: one observation in, the shapes it settles out (paper §5)."""
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -175,18 +176,17 @@ class Reconstruction:
                 self._adopt(found)
         return self.catch_up()
 
-    def revise(self) -> bool:
-        """What the object is by keyframes of all frames so far: replace the model, if they tell; whether they do.
+    def revise(self, frames: Iterable[tuple[Array, Mask]]) -> bool:
+        """Replace the model by what the keyframes of all `frames` tell the object to be, if they do; whether they do.
 
-        Then all frames are worth another pass: the next one to `update` is the first again.
+        Then these, which `update` was given, are worth another pass: the next one to it is the first again.
         """
-        found = self._mapper.final(self._assumed) if self._mapper and self.window else None
-        if self._mapper is None or found is None:
-            return False
-        self._foresight = Foresight(self._mapper.start)
-        self._mapper = self._last = None
-        self._adopt(found)
-        return True
+        if self._mapper and self.window and (found := self._mapper.final(self._assumed, frames)):
+            self._foresight = Foresight(self._mapper.start)
+            self._mapper = self._last = None
+            self._adopt(found)
+            return True
+        return False
 
     def foresee(self, frames: list[tuple[Array, Mask]]) -> None:
         """Begin what can be done for the next frames, points (2, p) px with visibility (p,), before they come."""

@@ -109,7 +109,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
         started = perf_counter()
         estimates = online = reconstructed(reconstruction, W, visible, progress)
         estimates += reconstruction.finish()
-        if config.final_pass and reconstruction.revise():
+        if config.final_pass and reconstruction.revise(zip(W, visible, strict=True)):
             estimates = reconstructed(reconstruction, W, visible, progress)
         elapsed_ms = (perf_counter() - started) * 1e3
     if not all(np.isfinite(estimate.shape).all() for estimate in (*online, *estimates)):

@@ -43,8 +43,7 @@ class TrackedObject:
         since, last: frames of the source from which on it has been followed, and that showed it last.
         recordings: the files that it is recorded in.
         reconstruction: its estimator.
-        collected: its estimates.
-        online: its estimates as they were shown on the way, if there was another pass; else None.
+        collected, online: its estimates, and as they were shown on the way, if there was another pass (else None).
 
     Raises:
         UsageError, TrackingError: a mesh or truth that does not fit.
@@ -166,21 +165,23 @@ class TrackedObject:
 
     def revised(self) -> Iterator[FrameShape]:
         """The shapes of all frames once more, with a last map; none where that tells nothing new."""
-        if not self.config.passes or not self.reconstruction.revise():
+        stored = self._stored
+        if stored is None or not self.config.passes:
             return
-        assert self._stored is not None
+        if not self.reconstruction.revise(self._on_surface(one.observation) for one in stored if not one.lost):
+            return
         self.online, self.collected = self.collected, self._nothing()
         lost = False
-        for stored in self._stored.told_ahead(lambda some: self.reconstruction.foresee([*map(self._on_surface, some)])):
-            if stored.lost:
-                self.collected.lose(stored.index)
+        for one in stored.told_ahead(lambda some: self.reconstruction.foresee([*map(self._on_surface, some)])):
+            if one.lost:
+                self.collected.lose(one.index)
                 lost = True
                 continue
             if lost:
                 self.reconstruction.restart()
                 lost = False
-            self._times[stored.index] = stored.time_s
-            yield from self._of_frames(self.reconstruction.update(*self._on_surface(stored.observation)))
+            self._times[one.index] = one.time_s
+            yield from self._of_frames(self.reconstruction.update(*self._on_surface(one.observation)))
 
     def _on_surface(self, seen: Observation) -> tuple[Array, Flags]:
         """Points (2, P) px, and which of them are seen (P,) and on the surface."""

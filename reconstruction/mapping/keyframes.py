@@ -1,5 +1,7 @@
 """A few keyframes of a whole video: those whose images differ most, chosen while it runs, in bounded memory."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from reconstruction.arrays import Array, Indices, Mask
@@ -83,6 +85,14 @@ class Keyframes:
     def _drop(self, k: int) -> None:
         del self.frames[k], self._W[k], self._visible[k]
         self._apart = np.delete(np.delete(self._apart, k, axis=0), k, axis=1)
+
+
+def spread_of(frames: Iterable[tuple[Array, Mask]], capacity: int) -> tuple[Array, Mask, Indices]:
+    """So many keyframes of frames, points (2, p) px and visible (p,), as `Keyframes.spread` gives them."""
+    keyframes = Keyframes(capacity)
+    for number, (W, visible) in enumerate(frames):
+        keyframes.offer(number, W, visible)
+    return keyframes.spread()
 
 
 def difference(W: Array, visible: Mask, others: Array, others_visible: Mask) -> Array:

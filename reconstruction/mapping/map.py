@@ -1,5 +1,6 @@
 """What the object is, by its keyframes: which kind of thing, its rest shape, its camera, and its shape in any frame."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -142,7 +143,7 @@ def map_of(
     start: Start = at_once,
     given: RestShape | None = None,
     kind: Kind | None = None,
-    last: tuple[Array, Mask] | None = None,
+    last: Callable[[], tuple[Array, Mask]] | None = None,
 ) -> Map | None:
     """What keyframes W (K, 2, p) px with visibility (K, p) show, most different ones first; None where they do not tell.
 
@@ -155,8 +156,8 @@ def map_of(
         start: where a part of the work is done, meanwhile.
         given: a rest shape from elsewhere, which stays. Keyframes of anything but a sheet in perspective add nothing to it.
         kind: what it is, if that is known; its evidence is what keyframes say all the same.
-        last: more keyframes and their visibility, by which a solid is made, if there will be no other map, so that time
-            may be spent on it.
+        last: gives more keyframes and their visibility, by which a solid is made, if there will be no other map, so that
+            time may be spent on it.
     """
     if len(W) < FEWEST_KEYFRAMES or (given is not None and not camera.perspective):
         return None
@@ -179,7 +180,7 @@ def map_of(
             if kind is None and given is None and found.sheet and found.sheet.strain_beyond_noise > MOST_STRETCH:
                 found, evidence = None, replace(evidence, kind="solid")
         if found is None:
-            by = last or by
+            by = last() if last else by
             found = solid_map(*by, camera, evidence, estimate_focal=estimate_focal, known=known, last=patient)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None

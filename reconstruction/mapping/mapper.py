@@ -1,8 +1,9 @@
 """Mapping while frames come: the first model, and another one whenever the views have grown."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.mapping.bootstrap import bootstrap
-from reconstruction.mapping.keyframes import KEYFRAMES, Keyframes, difference
+from reconstruction.mapping.keyframes import KEYFRAMES, Keyframes, difference, spread_of
 from reconstruction.mapping.map import Map, map_of
 from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations
@@ -67,7 +68,6 @@ class Mapper:
         refined = settings.refine_rest and settings.deformation in ("auto", "inextensible")
         mapped = settings.maps and (given is None or refined)
         self._keyframes = Keyframes() if mapped else None
-        self._more_keyframes = Keyframes(MORE * KEYFRAMES) if mapped and given is None and not live else None
         self._frame = -1
         # Frames, until they have given the first model.
         self._first: list[tuple[Array, Mask]] | None = [] if given is None else None
@@ -98,8 +98,6 @@ class Mapper:
             self._begin = begin
         if self._keyframes is not None:
             self._keyframes.offer(self._frame, W, visible)
-        if self._more_keyframes is not None:
-            self._more_keyframes.offer(self._frame, W, visible)
         if self._first is not None:
             if visible.sum() >= FEWEST_POINTS:
                 self._first.append((W, visible))
@@ -123,16 +121,20 @@ class Mapper:
         self._first = None
         return begun or bootstrap(W, visible, camera, self._settings, last=True)
 
-    def final(self, camera: Camera) -> Map | None:
-        """The map of the keyframes of all frames, posed first as in the first frame; None if they do not tell."""
+    def final(self, camera: Camera, frames: Iterable[tuple[Array, Mask]]) -> Map | None:
+        """The map of the keyframes of all frames, posed first as in the first frame; None if they do not tell.
+
+        Args:
+            camera: as for `add`.
+            frames: all of them once more, points (2, p) px and visible (p,); they are read if it is a solid.
+        """
         if self._keyframes is None or not self._keyframes.frames:
             return None
-        W, visible, _ = self._keyframes.spread()
-        more = (self._more_keyframes or self._keyframes).spread()
+        (W, visible, _), more = self._keyframes.spread(), cache(lambda: spread_of(frames, MORE * KEYFRAMES))
         asked = camera, self._settings.estimate_focal, self._known, self.start, self._given, self._settings.kind
-        found = map_of(W, visible, *asked, last=more[:2])
+        found = map_of(W, visible, *asked, last=lambda: more()[:2])
         if found is not None and found.sheet is None:
-            found = with_deformations(found, self._settings, *more)
+            found = with_deformations(found, self._settings, *more())
         found = found or self._found
         return found and self._begin and nearest_first(found, *self._begin)
 

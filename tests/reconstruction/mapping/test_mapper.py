@@ -29,7 +29,7 @@ def model(poses: int) -> Map:
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Models that say how many frames they are of."""
     monkeypatch.setattr(mapper, "bootstrap", lambda W, *others: model(len(W)) if others[-1] else None)
-    monkeypatch.setattr(mapper, "map_of", lambda W, *_, last=None: model(len(last[0] if last else W)))
+    monkeypatch.setattr(mapper, "map_of", lambda W, *_, last=None: model(len(last()[0] if last else W)))
 
 
 class Later:
@@ -62,7 +62,7 @@ def test_the_last_of_the_first_looks_decides() -> None:
     used = Mapper(Settings(revise=False))
     assert adopted(used, range(200)) == [FIRST_LOOKS[-1] - 1]
     assert used.first_frames == FIRST_LOOKS[-1]
-    assert used.final(CAMERA) is None
+    assert used.final(CAMERA, []) is None
 
 
 def test_maps_made_elsewhere_are_in_force_after_a_fixed_number_of_frames() -> None:
@@ -118,8 +118,9 @@ def test_posed_first_as_where_it_begins() -> None:
 
 def test_the_final_map_is_of_more_keyframes() -> None:
     used = Mapper(Settings())
-    adopted(used, range(MORE * KEYFRAMES + 1))
-    found = used.final(CAMERA)
+    frames = range(MORE * KEYFRAMES + 1)
+    adopted(used, frames)
+    found = used.final(CAMERA, ((image(f), np.ones(POINTS, bool)) for f in frames))
     assert found is not None
     assert len(found.rest.motion.s) == MORE * KEYFRAMES
 
