@@ -96,10 +96,11 @@ def chi_squared(rest: Array, to: Indices | None = None) -> Array:
 def jensen_shannon(rest: Array, to: Indices | None = None) -> Array:
     """D (p, p), or its columns `to`: root of the Jensen-Shannon divergence of distributions over well-spread landmarks.
 
-    A point belongs to each landmark with a weight that falls like a Gaussian with their distance.
+    A point belongs to each landmark with a weight that falls like a Gaussian with their distance. The rest shape may have
+    further coordinates (d, p), see `modal_basis`.
     """
     landmarks = rest[:, farthest_points(rest.T, LANDMARKS)]
-    weights = np.exp(-0.5 * (cdist(rest.T, landmarks.T) / (BLUR * rms_radius(rest))) ** 2)
+    weights = np.exp(-0.5 * (cdist(rest.T, landmarks.T) / (BLUR * rms_radius(rest[:3]))) ** 2)
     shares = weights / weights.sum(axis=1, keepdims=True)
     others = shares if to is None else shares[to]
     own, theirs = minus_entropy(shares), minus_entropy(others)

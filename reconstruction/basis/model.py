@@ -158,6 +158,7 @@ def build_model(
     metric: Metric = "euclidean",
     mesh: Mesh | None = None,
     seen: Mask | None = None,
+    own_motion: Array | None = None,
 ) -> Model:
     """Mesh and modes of a rest shape.
 
@@ -168,6 +169,7 @@ def build_model(
         metric: the dissimilarity they come from.
         mesh: its mesh, if it has one; else points are triangulated,
         seen: and those that views (K, p) hardly ever show left out at the border: modes are those of all points.
+        own_motion: as for `modal_basis`.
 
     Raises:
         ReconstructionError: more modes than the points carry.
@@ -175,7 +177,7 @@ def build_model(
     from reconstruction.basis.modes import modal_basis  # SciPy takes its time to load, and who only draws needs none
 
     shape, whole = rest.motion.shape, mesh or triangulated(rest, camera, seen)
-    basis = modal_basis(shape, whole, modes, metric)
+    basis = modal_basis(shape, whole, modes, metric, own_motion)
     shown = whole if mesh or seen is None else without_strays(whole, seen)
     return Model(basis, shown, camera, float(rest.motion.s[0]))
 

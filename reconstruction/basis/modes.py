@@ -15,8 +15,17 @@ EXACT_POINTS = 4000  # with more, modes come from the distances to landmarks: al
 EXACT_JENSEN_SHANNON = 1000  # the same for Jensen-Shannon distances, which take ten times as long
 
 
-def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean") -> ModalBasis:
+def modal_basis(
+    rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean", own_motion: Array | None = None
+) -> ModalBasis:
     """The r leading modes of a rest shape (3, p): exact, or of many points from their distances to landmarks.
+
+    Args:
+        rest: (3, p).
+        mesh: its mesh, for distances along it.
+        modes: how many.
+        metric: the dissimilarity.
+        own_motion: (d, p) further coordinates, by which Jensen-Shannon distances tell apart what does not move together.
 
     Raises:
         ReconstructionError: not 1 <= modes < p, or a mesh in pieces with the manhattan metric.
@@ -25,11 +34,12 @@ def modal_basis(rest: Array, mesh: Mesh, modes: int, metric: Metric = "euclidean
     if not 1 <= modes < p:
         raise ReconstructionError(f"modes {modes} does not fit {p} points: choose 1 to {p - 1}", "modes")
     rest = rest - rest.mean(axis=1, keepdims=True)
+    places = rest if own_motion is None or metric != "jensen-shannon" else np.concatenate([rest, own_motion])
     if p > exact_points(metric):
-        eigenvalues, vectors = landmarks.leading_eigenpairs(rest, mesh.edges, modes, metric)
+        eigenvalues, vectors = landmarks.leading_eigenpairs(places, mesh.edges, modes, metric)
         Upsilon = with_fixed_signs(vectors).T
     else:
-        D = distances.dissimilarity(metric, rest, mesh.edges)
+        D = distances.dissimilarity(metric, places, mesh.edges)
         eigenvalues, Upsilon = leading_eigenpairs(doubly_centred(D), modes)
     return ModalBasis(rest, Upsilon, eigenvalues, principal_axes(rest))
 

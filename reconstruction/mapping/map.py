@@ -65,8 +65,8 @@ class Map:
         """Whether it is bent, not turned: a plane or a sheet."""
         return self.rest.flat or self.sheet is not None
 
-    def modelled(self, settings: Settings, mesh: Mesh | None = None) -> Model:
-        """The rest shape with its modes; its mesh may be given.
+    def modelled(self, settings: Settings, mesh: Mesh | None = None, own_motion: Array | None = None) -> Model:
+        """The rest shape with its modes; its mesh may be given, and how its points move (d, p), as for `modal_basis`.
 
         Raises:
             ReconstructionError: more modes are asked for than the points carry.
@@ -74,7 +74,7 @@ class Map:
         metric = distances.fitting(settings.metric, flat=self.is_sheet)
         most = self.rest.motion.shape.shape[1] - 1
         modes = min(self.modes, most) if settings.modes == "auto" else settings.modes
-        return build_model(self.rest, self.camera, modes, metric, mesh, self.seen)
+        return build_model(self.rest, self.camera, modes, metric, mesh, self.seen, own_motion)
 
     def foreseen(self, frames: list[tuple[Array, Mask]], last: Foreseen | None = None) -> list[Foreseen | None]:
         """What `expected` finds in frames, one after the other, points (2, p) px, anything where not visible (p,).

@@ -9,9 +9,11 @@ from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import rotation_from_quaternion
 from reconstruction.mapping.map import Map
+from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.deformations import Learned
 from reconstruction.mapping.solid.deforming.learning import POINTS, learned
+from reconstruction.mapping.solid.deforming.own_motion import own_motion
 from reconstruction.mapping.solid.placing import well_spread
 from reconstruction.settings import MOST_MODES, Settings
 from reconstruction.state import State, join
@@ -41,14 +43,15 @@ def with_deformations(found: Map, settings: Settings, W: Array, visible: Mask, f
     order = np.argsort(frames)
     W, visible = np.where(visible[:, None], W, 0.0)[order], visible[order]
     motion = found.rest.motion.in_order(order)
-    model = replace(found, modes=MOST_MODES, model=None).modelled(settings)
+    rigid = seen_by(found.camera, motion) - W
+    moves = own_motion(rigid / motion.s[:, None, None], without_outliers(W, visible))
+    model = replace(found, modes=MOST_MODES, model=None).modelled(settings, own_motion=moves)
     some = well_spread(model.B[:3], visible, POINTS)
     few, part = model.of_points(some), (W[:, :, some], visible[:, some])
     motion = replace(motion, shape=motion.shape[:, some])
     try:
         state = followed(few, settings, motion, *part)
-        rigid = seen_by(found.camera, motion) - part[0]
-        if not predicted(few, *part, state, lengths(rigid)):
+        if not predicted(few, *part, state, lengths(rigid[:, :, some])):
             return found
         return about(found, model, learned(model, W, visible, state), np.argsort(order))
     except np.linalg.LinAlgError:  # of points that lie as none do
