@@ -12,6 +12,7 @@ from app.synthetic.path import Path
 
 Shape = Callable[[Array, float], Array]  # of places (n, 2) and a time from 0 to 1: points (n, 3)
 Maker = Callable[[np.random.Generator], Shape]
+JAW = 0.12  # where the mouth is, down from the middle of a head
 HELD_SEEDS = 100  # seeds from this one on are held back
 
 
@@ -108,6 +109,16 @@ def living(shape: Callable[[Array], Array], pull: float) -> Maker:
     return maker
 
 
+def chewing(rng: np.random.Generator) -> Shape:
+    """A head whose jaw, a third of it, opens and shuts: two rigid parts beside each other."""
+    pace, a = rng.uniform(3, 5), rng.uniform(0, 2 * np.pi)
+
+    def shape(places: Array, time: float) -> Array:
+        return solid.hinged(solid.head(places), JAW, 0.25 * (1 + np.sin(2 * np.pi * pace * time + a)))
+
+    return shape
+
+
 def still(shape: Callable[[Array], Array]) -> Maker:
     """Things that do not change."""
     return lambda _: lambda places, _time: shape(places)
@@ -138,6 +149,7 @@ KINDS = {
     "head": Kind("solid", still(solid.head), SOLID_TURN),
     "head-late": Kind("solid", still(solid.head), SOLID_TURN, late=0.5),
     "talking-head": Kind("solid", living(solid.head, 0.06), SOLID_TURN),
+    "chewing-head": Kind("solid", chewing, SOLID_TURN),
     "heart": Kind("solid", living(heart, 0.1), SHEET_TURN),
     "can": Kind("solid", still(solid.can), SOLID_TURN, held_back=True),
     "balloon": Kind("", swelling, SOLID_TURN),

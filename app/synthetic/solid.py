@@ -1,4 +1,4 @@
-"""Solids seen from their front: box, can, head; a balloon that swells; and what makes them live.
+"""Solids seen from their front: box, can, head; a balloon that swells; and what makes them live or chew.
 
 A place is (x, y) on a rectangle of width 1; its shape is a point (x, y, z) with z to the back.
 """
@@ -9,6 +9,7 @@ from app.arrays import Array
 from app.synthetic.sheet import bent, folded
 
 ACROSS = 0.0  # bent from left to right
+HINGE = 0.45  # how far behind the front a jaw's axis is
 PULLED = 0.18  # how far around its centre a pull reaches, of the width
 
 
@@ -36,6 +37,14 @@ def balloon(places: Array, blown: float) -> Array:
     squared = (places**2).sum(axis=1)
     wider = 1 + 0.25 * blown
     return np.column_stack([places * wider, -0.4 * blown * np.exp(-squared / 0.2)])
+
+
+def hinged(points: Array, below: float, angle: float) -> Array:
+    """Points (n, 3), those with a greater y turned about an axis from left to right behind them, as a jaw is."""
+    c, s = np.cos(angle), np.sin(angle)
+    axis = np.array([0.0, below, HINGE])
+    turned = (points - axis) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]]).T + axis
+    return np.where(points[:, 1:2] > below, turned, points)
 
 
 def pulled(points: Array, centres: Array, ways: Array) -> Array:

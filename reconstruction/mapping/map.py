@@ -124,7 +124,9 @@ class Map:
     def in_order(self, order: Indices) -> "Map":
         """The same, its poses in another order: the first is that of the frame where it begins."""
         motion = self.rest.motion.in_order(order)
-        return replace(self, rest=replace(self.rest, motion=motion), model=self.model and self.model.begun(motion))
+        seen = None if self.seen is None else self.seen[order]
+        model = self.model and self.model.begun(motion)
+        return replace(self, rest=replace(self.rest, motion=motion), seen=seen, model=model)
 
     def scaled(self, factor: float) -> "Map":
         """The same, so many times as large, and so many times as far away."""

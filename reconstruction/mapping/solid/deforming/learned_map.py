@@ -42,49 +42,63 @@ def with_deformations(found: Map, settings: Settings, W: Array, visible: Mask, f
         return found
     order = np.argsort(frames)
     W, visible = np.where(visible[:, None], W, 0.0)[order], visible[order]
-    motion = found.rest.motion.in_order(order)
-    rigid = seen_by(found.camera, motion) - W
-    moves = own_motion(rigid / motion.s[:, None, None], without_outliers(W, visible))
-    model = replace(found, modes=MOST_MODES, model=None).modelled(settings, own_motion=moves)
-    some = well_spread(model.B[:3], visible, POINTS)
-    few, part = model.of_points(some), (W[:, :, some], visible[:, some])
-    motion = replace(motion, shape=motion.shape[:, some])
+    sound, rigid = without_outliers(W, visible), found.in_order(order)
     try:
-        state = followed(few, settings, motion, *part)
-        if not predicted(few, *part, state, lengths(rigid[:, :, some])):
+        model, first = begun(rigid, settings, W, visible, sound)
+        hidden = visible & (np.random.default_rng(0).random(visible.shape) < HIDDEN)
+        trial = learned(model, W, visible & ~hidden, first, first.log_s, TRIAL)
+        if not predicted(model, W, hidden, trial, rigid):
             return found
-        return about(found, model, learned(model, W, visible, state), np.argsort(order))
+        latest = about(rigid, model, trial)  # whose poses tell better what moves together
+        again, state = begun(latest, settings, W, visible, sound)
+        log_s = first.log_s + np.log(model.scale / again.scale)  # else each start would let them go further
+        latest = about(latest, again, learned(again, W, visible, state, log_s))
     except np.linalg.LinAlgError:  # of points that lie as none do
         return found
+    return latest.in_order(np.argsort(order))
 
 
-def followed(model: Model, settings: Settings, motion: RigidMotion, W: Array, visible: Mask) -> State:
-    """Pose and Λ' of keyframes (K, 2, p) px, visible (K, p), one after the other in their order (n = K)."""
-    window = SlidingWindow(model, build_energy(model, "general", settings.priors), settings.window, motion)
+def begun(found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) -> tuple[Model, State]:
+    """Modes by what moves together, and pose and Λ' of each keyframe by itself.
+
+    Args:
+        found: the map of keyframes, in their order.
+        settings: how to reconstruct.
+        W: (K, 2, p) px; finite.
+        visible: (K, p).
+        sound: (K, p) of that, what is not grossly wrong.
+    """
+    motion = found.rest.motion
+    apart = own_motion((seen_by(found.camera, motion) - W) / motion.s[:, None, None], sound)
+    model = replace(found, modes=MOST_MODES, model=None).modelled(settings, own_motion=apart)
+    some = well_spread(model.B[:3], visible, POINTS)
+    few = model.of_points(some)
+    energy = build_energy(few, "general", settings.priors)
+    window = SlidingWindow(few, energy, settings.window, replace(motion, shape=motion.shape[:, some]))
     states = []
-    for one, seen in zip(W, visible, strict=True):
+    for one, seen in zip(W[:, :, some], visible[:, some], strict=True):
         window.advance(one, seen)
         assert window.state is not None
         states.append(window.state[-1:])
-    return join(states)
+    return model, join(states)
 
 
-def predicted(model: Model, W: Array, visible: Mask, state: State, rigid_px: Array) -> bool:
-    """Whether deformations predict hidden points much better than the rigid shape, which is off by (K, p) px, fits them."""
-    hidden = visible & (np.random.default_rng(0).random(visible.shape) < HIDDEN)
+def predicted(model: Model, W: Array, hidden: Mask, known: Learned, rigid: Map) -> bool:
+    """Whether deformations predict the points (K, p) hidden from them much better than the rigid shape fits them."""
     if not hidden.any():
         return False
-    found = learned(model, W, visible & ~hidden, state, TRIAL)
-    off = lengths(residuals(found.B, model.normalised(W), found.state.matrices(), model.focal)) * model.radius_px
-    return bool(np.quantile(off[hidden], COMPARED) < BETTER * np.quantile(rigid_px[hidden], COMPARED))
+    off = residuals(known.B, model.normalised(W), known.state.matrices(), model.focal) * model.radius_px
+    before = seen_by(rigid.camera, rigid.rest.motion) - W
+    now, then = (float(np.quantile(lengths(left)[hidden], COMPARED)) for left in (off, before))
+    return now < BETTER * then
 
 
-def about(found: Map, model: Model, known: Learned, back: Indices) -> Map:
-    """The map about another rest shape, with its keyframes' poses put back in the map's order."""
+def about(found: Map, model: Model, known: Learned) -> Map:
+    """The map about another rest shape, with the poses that its keyframes have then."""
     Phi, state = model.basis.Phi, known.state
     shape = model.radius * Phi @ known.B[:3]
     R, s = rotation_from_quaternion(state.q) @ Phi.T, model.scale * np.exp(state.log_s)
-    motion = RigidMotion(shape, R, s, model.radius_px * state.t).in_order(back)
+    motion = RigidMotion(shape, R, s, model.radius_px * state.t)
     rest = replace(found.rest, motion=motion)
     model = Model(replace(model.basis, rest=shape), model.mesh, model.camera, float(motion.s[0]))
     return replace(found, rest=rest, modes=len(model.basis.eigenvalues), model=model, deformations=known.deformations)

@@ -39,7 +39,7 @@ LEAST_NOISE = 7.5e-3  # of the size: neighbours' errors are alike, and what is b
 LOOSE = 1e-3  # pull of a point of the rest shape to where it was, of what images say about it
 
 
-def learned(model: Model, W: Array, visible: Mask, state: State, rounds: int = ROUNDS) -> Learned:
+def learned(model: Model, W: Array, visible: Mask, state: State, log_s: Array, rounds: int = ROUNDS) -> Learned:
     """The Gaussian, and the rest shape about which it is, from where a window has found the keyframes to be.
 
     Args:
@@ -47,13 +47,14 @@ def learned(model: Model, W: Array, visible: Mask, state: State, rounds: int = R
         W: (K, 2, p) px; finite.
         visible: (K, p).
         state: pose and Λ' of each (n = K).
+        log_s: (K,) to which scales are held.
         rounds: of expectation and maximisation.
 
     Raises:
         LinAlgError: no Gaussian holds the points.
     """
     seen, some = model.normalised(W), well_spread(model.B[:3], visible, POINTS)
-    learning = ExpectationMaximisation(model, some, seen[:, :, some], visible[:, some], state.log_s)
+    learning = ExpectationMaximisation(model, some, seen[:, :, some], visible[:, some], log_s)
     path = [learning.begun(model.B, state)]
     for k in range(1, rounds + 1):
         path.append(learning.round(path[-1]))

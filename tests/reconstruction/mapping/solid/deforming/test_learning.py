@@ -1,7 +1,5 @@
 """Deformations of a solid, learned from its keyframes: deeper than images alone tell, and none where there are none."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -12,10 +10,10 @@ from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.deforming import learned_map, learning
-from reconstruction.mapping.solid.deforming.learned_map import followed, with_deformations
+from reconstruction.mapping.solid.deforming.learned_map import begun, with_deformations
 from reconstruction.mapping.solid.deforming.learning import POINTS, learned
 from reconstruction.mapping.solid.solid import bundle_adjust
-from reconstruction.settings import MOST_MODES, Settings
+from reconstruction.settings import Settings
 from reconstruction.state import State
 from reconstruction.window.normal import inverted
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
@@ -52,9 +50,8 @@ def turned(B: Array, state: State) -> Array:
 def test_depth_of_deformations_is_learned(camera: Camera) -> None:
     shapes, W, visible = keyframes(0.06, camera)
     found = mapped(W, visible, camera)
-    model = replace(found, modes=MOST_MODES).modelled(Settings())
-    before = followed(model, Settings(), found.rest.motion, W, visible)
-    after = learned(model, W, visible, before)
+    model, before = begun(found, Settings(), W, visible, visible)
+    after = learned(model, W, visible, before, before.log_s)
     errors = [e3d(turned(B, state), shapes).mean() for B, state in ((model.B, before), (after.B, after.state))]
     assert errors[1] < 0.75 * errors[0]
 
@@ -62,11 +59,10 @@ def test_depth_of_deformations_is_learned(camera: Camera) -> None:
 def test_it_takes_fewer_rounds_since_two_tell_where_they_lead_to(monkeypatch: pytest.MonkeyPatch) -> None:
     shapes, W, visible = keyframes(0.06)
     found = mapped(W, visible, PERSPECTIVE)
-    model = replace(found, modes=MOST_MODES).modelled(Settings())
-    before = followed(model, Settings(), found.rest.motion, W, visible)
-    quick = learned(model, W, visible, before, rounds=16)
+    model, before = begun(found, Settings(), W, visible, visible)
+    quick = learned(model, W, visible, before, before.log_s, rounds=16)
     monkeypatch.setattr(learning, "extrapolated", lambda *path: path[-1])
-    slow = learned(model, W, visible, before, rounds=16)
+    slow = learned(model, W, visible, before, before.log_s, rounds=16)
     errors = [e3d(turned(known.B, known.state), shapes).mean() for known in (quick, slow)]
     assert errors[0] < 0.9 * errors[1]
 
@@ -74,9 +70,8 @@ def test_it_takes_fewer_rounds_since_two_tell_where_they_lead_to(monkeypatch: py
 def test_dense_points_are_placed_by_those_they_are_learned_from() -> None:
     shapes, W, visible = keyframes(0.06, points=POINTS + 200)
     found = mapped(W, visible, PERSPECTIVE)
-    model = replace(found, modes=MOST_MODES).modelled(Settings())
-    before = followed(model, Settings(), found.rest.motion, W, visible)
-    after = learned(model, W, visible, before, rounds=20)
+    model, before = begun(found, Settings(), W, visible, visible)
+    after = learned(model, W, visible, before, before.log_s, rounds=20)
     assert e3d(turned(after.B, after.state), shapes).mean() < 0.9 * e3d(turned(model.B, before), shapes).mean()
 
 
