@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 
 KEYFRAMES = 30
@@ -88,10 +89,16 @@ class Keyframes:
 
 
 def spread_of(frames: Iterable[tuple[Array, Mask]], capacity: int) -> tuple[Array, Mask, Indices]:
-    """So many keyframes of frames, points (2, p) px and visible (p,), as `Keyframes.spread` gives them."""
+    """So many keyframes of frames, points (2, p) px and visible (p,), as `Keyframes.spread` gives them.
+
+    Raises:
+        ReconstructionError: no frame shows enough points.
+    """
     keyframes = Keyframes(capacity)
     for number, (W, visible) in enumerate(frames):
         keyframes.offer(number, W, visible)
+    if not keyframes.frames:
+        raise ReconstructionError(f"no frame shows {FEWEST_SHARED} points")
     return keyframes.spread()
 
 

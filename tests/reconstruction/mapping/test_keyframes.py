@@ -1,10 +1,12 @@
 """Keyframes: spread, bounded, whatever the units, gaps and gross errors."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reconstruction.mapping.keyframes import Keyframes, difference, farthest_first
+from reconstruction import ReconstructionError
+from reconstruction.mapping.keyframes import Keyframes, difference, farthest_first, spread_of
 from tests.reconstruction.mapping.bending import waving_sheet
 
 POINTS = 80
@@ -29,6 +31,17 @@ def test_they_are_spread_and_no_more_than_asked_for() -> None:
     assert len(keyframes.frames) == 8
     even = [int(f) for f in np.linspace(0, 119, 8)]
     assert spacing(W, keyframes.frames) > spacing(W, even)
+
+
+def test_all_at_once_they_are_the_same() -> None:
+    W, _ = waving_sheet(np.random.default_rng(3), frames=60, points=POINTS)
+    visible = np.random.default_rng(4).random((60, POINTS)) < 0.7
+    once, _, frames = spread_of(zip(W, visible, strict=True), 8)
+    before, _, same = chosen(W, visible).spread()
+    np.testing.assert_array_equal(frames, same)
+    np.testing.assert_array_equal(once, before)
+    with pytest.raises(ReconstructionError, match="no frame shows"):
+        spread_of([(W[0], np.zeros(POINTS, bool))], 8)
 
 
 def test_a_still_scene_changes_nothing_any_more() -> None:
