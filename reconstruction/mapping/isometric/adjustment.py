@@ -46,7 +46,9 @@ TORN = 2.5  # the worst edges' change over the usual one: strays spoil the start
 LITTLE_GAIN = 0.1  # of the change: a round that brought less is the last
 MOST_CHANGE = 0.03  # of lengths, rms, noise apart: no cloth stretches so much; less is weighed against a solid
 MOST_AT_ALL = 0.045  # with noise: what is that far off smooth images is not noise
-MOST_NOISE = 0.04  # over the image's RMS radius: what hides that much is no smooth image, and keeps any lengths
+MOST_PARALLAX = (
+    0.01  # over the image's RMS radius: of true sheets 0.1 %, 0.5 % where noise is 2 %; seen through 1.5 % and more
+)
 PART_LEFT_OUT = 0.4  # of the points
 SOLVER = Solver()
 
@@ -70,8 +72,10 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
     warps = smooth_warps(W, visible)
     if len(W) < 3 or warps.placed.sum() < 20:
         raise ReconstructionError("a sheet of unknown shape needs 3 keyframes and 20 points")
-    if (noise := warps.noise_over_size) > MOST_NOISE:
-        raise ReconstructionError(f"no smooth surface: points are {noise:.1%} of its size beside smooth images")
+    if (parallax := warps.parallax_over_size(W, visible)) > MOST_PARALLAX:
+        raise ReconstructionError(
+            f"no smooth surface: points are {parallax:.1%} of its size beside smooth images, together"
+        )
     return on_smooth_images(warps, camera)
 
 

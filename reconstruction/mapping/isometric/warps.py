@@ -20,12 +20,16 @@ from reconstruction.mapping.isometric.smooth_field import (
     weights_of,
 )
 from reconstruction.mapping.outliers import without_outliers
+from reconstruction.principal import principal
+from reconstruction.window.robust import lengths
 
 FUNCTIONS = 100  # of the field that an image is made of
 NODES = 200
 FEW = 250  # well-spread points that are enough to tell gross errors
 FEWEST = 3  # of them that each image must show
 TRIED = 8  # images by which the weight of bending is found
+DEPTHS = 3  # ways in which points of a solid that is seen through are off its smooth images
+FAR = 4.0  # times as far off as usual
 FIRM = 10.0 ** np.arange(-7, 1.5, 0.5)  # weights of bending that are tried
 FIRST_FIRMNESS = 1e-5
 
@@ -71,6 +75,15 @@ class Warps:
         """Usual noise over the images' RMS radius."""
         size = np.sqrt(self.images(self.placed).var(axis=2).sum(axis=1))
         return float(np.median(self.noise_px / size.clip(1e-300)))
+
+    def parallax_over_size(self, W: Array, visible: Mask) -> float:
+        """Of that, what points of images W (F, 2, p) px, visible (F, p), do together: no noise, but depth seen through."""
+        known = visible & self.placed
+        off = np.where(known[:, None], W - self.images(), 0.0)
+        length = lengths(off)
+        most = FAR * float(np.median(length[known]))
+        off *= np.minimum(1.0, most / np.maximum(length, 1e-300))[:, None]  # gross errors are no farther off than others
+        return self.noise_over_size * float(np.sqrt(principal(off, known, DEPTHS)[1]))
 
     def variance(self, points: Mask | Indices | slice = slice(None)) -> Array:
         """Variance (F, n) px² of a coordinate of those: small among visible points, large far from any."""
