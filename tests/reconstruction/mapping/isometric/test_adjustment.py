@@ -14,6 +14,7 @@ from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.one_frame import shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
+from tests.reconstruction.world import turns, views
 
 SEEN = np.ones((12, 150), bool)
 
@@ -147,6 +148,16 @@ def test_points_of_their_own_are_no_sheet() -> None:
     W, _ = waving_sheet(np.random.default_rng(5), noise_px=6.0)  # some 8 % of its size
     with pytest.raises(ReconstructionError, match="no smooth surface"):
         sheet(W, SEEN, CAMERA)
+
+
+def test_what_is_seen_through_is_no_sheet_but_noise_may_be_as_large() -> None:
+    cloud = 60 * np.random.default_rng(3).normal(size=(3, 150))
+    W, _ = views(cloud, turns(12), CAMERA)
+    with pytest.raises(ReconstructionError, match="together"):
+        sheet(W, SEEN, CAMERA)
+    rng = np.random.default_rng(4)
+    W, _ = waving_sheet(rng, noise_px=1.5)  # some 2 % of its size
+    sheet(W, SEEN, CAMERA)
 
 
 def test_what_stretches_is_no_sheet() -> None:
