@@ -73,9 +73,7 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
     if len(W) < 3 or warps.placed.sum() < 20:
         raise ReconstructionError("a sheet of unknown shape needs 3 keyframes and 20 points")
     if (parallax := warps.parallax_over_size(W, visible)) > MOST_PARALLAX:
-        raise ReconstructionError(
-            f"no smooth surface: points are {parallax:.1%} of its size beside smooth images, together"
-        )
+        raise ReconstructionError(f"no smooth surface: points are {parallax:.1%} of its size off it, together")
     return on_smooth_images(warps, camera)
 
 
