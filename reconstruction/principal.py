@@ -16,8 +16,8 @@ def principal(tracks: Array, visible: Mask, count: int) -> tuple[Array, float]:
         count: of ways, at most.
 
     Returns:
-        how much each point takes part in each of the ways, (d, p), in units of the tracks: a way is as long in all frames
-        together as a point is in this; and what share of all that is seen they explain, squared, from 0 to 1.
+        how much each point takes part in each of the ways, (d, p), in units of the tracks, ways being unit vectors over all
+        frames; and what share of the squares of all that is seen they explain, from 0 to 1.
     """
     K, _, p = tracks.shape
     seen = np.repeat(visible, 2, axis=0)

@@ -46,9 +46,7 @@ TORN = 2.5  # the worst edges' change over the usual one: strays spoil the start
 LITTLE_GAIN = 0.1  # of the change: a round that brought less is the last
 MOST_CHANGE = 0.03  # of lengths, rms, noise apart: no cloth stretches so much; less is weighed against a solid
 MOST_AT_ALL = 0.045  # with noise: what is that far off smooth images is not noise
-MOST_PARALLAX = (
-    0.01  # over the image's RMS radius: of true sheets 0.1 %, 0.5 % where noise is 2 %; seen through 1.5 % and more
-)
+MOST_PARALLAX = 0.01  # over the image's RMS radius: true sheets up to 0.5 %, by noise; what is seen through 1.5 % and more
 PART_LEFT_OUT = 0.4  # of the points
 SOLVER = Solver()
 

@@ -92,6 +92,17 @@ def test_a_rest_shape_that_was_given_stays_and_all_frames_are_found(unit: float)
     assert not kept.revise([(W[0], every)])
 
 
+def test_what_keyframes_show_stays_with_their_poses() -> None:
+    _, _, found = waving()
+    K = len(found.rest.motion.s)
+    found, order = replace(found, seen=np.random.default_rng(1).random((K, POINTS)) < 0.5), np.arange(K)[::-1]
+    assert found.seen is not None
+    again = found.in_order(order)
+    assert again.seen is not None
+    np.testing.assert_array_equal(again.seen, found.seen[order])
+    np.testing.assert_array_equal(again.rest.motion.R, found.rest.motion.R[order])
+
+
 def test_a_sheet_before_an_orthographic_camera() -> None:
     _, S, _ = waving()
     W = 300 * (S - S.mean(axis=2, keepdims=True))[:, :2] + np.array([320.0, 240.0])[:, None]
