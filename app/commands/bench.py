@@ -21,6 +21,7 @@ from app.terminal.summary import Summary
 Row = dict[str, object]
 
 README_TABLE = "bench"
+MOST_COLUMNS = 10  # of a table in a terminal
 
 
 @dataclass(frozen=True)
@@ -104,13 +105,31 @@ def in_words(facts: dict[str, str | int | None]) -> str:
 
 
 def as_table(title: str, measured: list[Row]) -> Table:
-    """A row for each."""
-    table = Table(title=title, title_justify="left")
-    for name in measured[0]:
-        table.add_column(name, justify="right")
-    for each in measured:
-        table.add_row(*(f"{v:.4g}" if isinstance(v, float) else "–" if v is None else str(v) for v in each.values()))
+    """A row for each of what was measured; if it has more figures than fit into a line, a column."""
+    each = [flat(row) for row in measured]
+    names = list(dict.fromkeys(name for row in each for name in row))
+    cells = [[name.replace("_", " ") for name in names], *([in_short(row.get(name)) for name in names] for row in each)]
+    if len(names) > MOST_COLUMNS:
+        cells = [["", *map(str, range(1, len(each) + 1))], *map(list, zip(*cells, strict=True))]
+    table = Table(*cells[0], title=title, title_justify="left")
+    for column in table.columns:
+        column.justify, column.overflow = "right", "fold"
+    for row in cells[1:]:
+        table.add_row(*row)
     return table
+
+
+def flat(row: Row) -> Row:
+    """Each figure under a name of its own, where several had one together."""
+    figures: Row = {}
+    for name, value in row.items():
+        figures |= {f"{name} {key}": one for key, one in value.items()} if isinstance(value, dict) else {name: value}
+    return figures
+
+
+def in_short(value: object) -> str:
+    """A figure in a table."""
+    return f"{value:.4g}" if isinstance(value, float) else "–" if value is None else str(value)
 
 
 def with_targets(ratios: Ratios) -> Table:

@@ -1,6 +1,7 @@
 """`modeshape bench`: what is refused, and what is printed."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -44,4 +45,6 @@ def test_what_is_measured_can_be_printed(capsys: pytest.CaptureFixture[str]) -> 
     printed = capsys.readouterr().out
     assert "pyceres is not installed" in printed
     assert "1.2×" in printed
+    assert re.search(r"core ms track │ +5 │", printed)
+    assert "…" not in printed  # all fits into a line
     json.loads(measured.as_json())
