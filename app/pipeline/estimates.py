@@ -9,8 +9,8 @@ import numpy as np
 
 from app.arrays import Array, Indices
 from app.files.writing import writable
+from app.pipeline.quality.course import Course
 from app.pipeline.quality.ruler import Ruler
-from app.pipeline.quality.verdict import Course
 from app.terminal.summary import Summary
 from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model

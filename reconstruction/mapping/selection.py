@@ -41,6 +41,8 @@ SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
 LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
 SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave so many times less than anything rigid, ...
 STRETCH_FREEDOM = 150.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane
+# A solid that turns less, while its relief explains less of what a plane leaves, is not proven: what deforms seems to turn.
+HARDLY_TURNED, EXPLAINED = 25.0, 2.4  # degrees; times
 PLAIN = 2.0  # sureness that leaves no doubt: one half of the keyframes is enough to test rigid shapes by
 SIGMAS = 1.1774  # median of a Rayleigh distribution
 HALF_NORMAL = 0.6745  # median of a half-normal one
@@ -61,34 +63,39 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Rigid:
-    """What a plane and a solid leave over, and the solid's turn and relief."""
+    """What a plane and a solid leave over, and the solid's turn and relief.
+
+    Attributes:
+        flat, solid: what each leaves over.
+        turn_degrees, relief: of the solid.
+    """
 
     flat: Misfit
     solid: Misfit
     turn_degrees: float
     relief: float
 
+    @property
+    def proven(self) -> bool:
+        """Whether the solid turns so far, or explains so much, that its depth is no guess."""
+        return self.turn_degrees >= HARDLY_TURNED or self.flat.whole_px > EXPLAINED * self.solid.whole_px
+
 
 @dataclass(frozen=True)
-class Evidence:
+class Evidence(Rigid):
     """What keyframes say about the kind of object.
 
     Attributes:
         kind: the hypothesis chosen.
-        flat, solid, sheet: what each leaves over; NaN where it was not to be had.
+        sheet: what it leaves over; NaN where none was to be had.
         length_change: change of the sheet's edge lengths between the halves of the keyframes; a robust deviation, relative.
         sureness: by what factor the next best hypothesis leaves more, freedom reckoned with; 1 is a toss-up.
-        turn_degrees, relief: of the solid.
     """
 
     kind: Kind
-    flat: Misfit
-    solid: Misfit
     sheet: Misfit
     length_change: float
     sureness: float
-    turn_degrees: float
-    relief: float
 
     @property
     def note(self) -> str:
@@ -135,7 +142,7 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     if sureness < PLAIN:
         rigid = both(rigid, rigid_by(views[1], views[0], camera, at))
         kind, sureness = decide(rigid, sheet, stretch)
-    return Evidence(kind, rigid.flat, rigid.solid, sheet, change, sureness, rigid.turn_degrees, rigid.relief)
+    return Evidence(rigid.flat, rigid.solid, rigid.turn_degrees, rigid.relief, kind, sheet, change, sureness)
 
 
 def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
@@ -152,13 +159,15 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     flat, solid = rigid.flat, rigid.solid
     gain = max(flat.whole_px, 1e-300) / max(SOLID_FREEDOM * solid.whole_px, 1e-300)
     best: Kind = "solid" if gain > 1 and rigid.relief > LEAST_RELIEF else "flat"
-    rigid_px = solid.edges_px if best == "solid" else min(flat.edges_px, solid.edges_px)
+    rigid_px, least = solid.edges_px if best == "solid" else min(flat.edges_px, solid.edges_px), SHEET_FREEDOM
+    if not rigid.proven:
+        rigid_px, least = min(flat.whole_px, solid.whole_px), 1.0
     better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
     explained = max(0.0, 1 - (solid.edges_px / max(flat.edges_px, 1e-300)) ** 2)  # by relief, of what a plane leaves
-    freedom = SHEET_FREEDOM + STRETCH_FREEDOM * stretch * explained
+    freedom = least + STRETCH_FREEDOM * stretch * explained
     if freedom * better < 1:
         return "sheet", float(1 / (freedom * better))
-    return best, float(min(max(gain, 1 / gain), SHEET_FREEDOM * better))
+    return best, float(min(max(gain, 1 / gain), least * better))
 
 
 def rigid_by(made: tuple[Array, Mask], tested: tuple[Array, Mask], camera: Camera, edges: Indices) -> Rigid:

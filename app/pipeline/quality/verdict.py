@@ -3,17 +3,16 @@
 [docs/verdict.md](../../../docs/verdict.md) has what the words were worth where the truth is known, and how it was measured.
 """
 
-from array import array
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal
 
 import numpy as np
 
 from app.arrays import Flags
+from app.pipeline.quality.course import Course
 from reconstruction.basis.rest_shape import RigidMotion, rms_radius
-from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
 from reconstruction.mapping.selection import PLAIN, Evidence
@@ -37,8 +36,7 @@ POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found th
 POOR_LENGTHS = 0.07  # change of them from half to half of the keyframes: sheets have up to 4.5 %, things with limbs 8 %
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 # What a rigid shape leaves over and neighbours share, which is no noise, over its radius and the sine of its turn: as much
-# its depth may be off, and more.
-FAIR_DEPTH, POOR_DEPTH = 0.0125, 0.045
+FAIR_DEPTH = 0.0125  # its depth may be off, and more
 FAIR_CHANGE, POOR_CHANGE = 0.028, 0.05  # the same with noise, over the radius alone: what changes is no longer small
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
@@ -46,35 +44,6 @@ LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be
 RECOVERED = ("rigid", "plane")  # by the first frames
 BY_KEYFRAMES = {"isometric": "sheet", "rigid": "solid"}  # kinds of rest shapes, in words
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
-
-
-@dataclass
-class Course:
-    """What each frame with a shape tells of its quality; four numbers a frame.
-
-    Attributes:
-        frames: of the source.
-        errors: median residual over the RMS radius of the image; NaN where nothing is seen.
-        errors_px: median residual.
-        shares: of the points seen.
-        lost: frames without the object.
-    """
-
-    frames: "array[int]" = field(default_factory=lambda: array("q"))
-    errors: "array[float]" = field(default_factory=lambda: array("f"))
-    errors_px: "array[float]" = field(default_factory=lambda: array("f"))
-    shares: "array[float]" = field(default_factory=lambda: array("f"))
-    lost: int = 0
-
-    def add(self, frame: int, estimate: ShapeEstimate) -> None:
-        """Add the estimate of a source frame."""
-        seen = estimate.residual_px[estimate.visible]
-        error_px = float(np.median(seen)) if len(seen) else np.nan
-        radius_px = float(np.sqrt(np.var(estimate.projection_px, axis=0).sum()))
-        self.frames.append(frame)
-        self.errors.append(error_px / max(radius_px, 1e-12))
-        self.errors_px.append(error_px)
-        self.shares.append(float(estimate.visible.mean()))
 
 
 @dataclass(frozen=True)
@@ -207,6 +176,10 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
+    if made and not found.evidence.proven:
+        told = f"turned by {found.evidence.turn_degrees:.0f}° alone, it shows hardly more of its depth than of its changes"
+        keeps_lengths = found.sheet is not None and found.sheet.stretch < MOST_STRETCH
+        yield Verdict("fair" if keeps_lengths else "poor", f"{told}: how deep it is is a guess; film it turning more")
     if found.rest.kind == "rigid":
         yield from of_solid(found.rest.motion, found.evidence)
         rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
@@ -221,10 +194,10 @@ def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
     radius_px = float(np.median(motion.s)) * rms_radius(motion.shape)  # in the images: the shape may have any size
     whole, edges = np.array([evidence.solid.whole_px, evidence.solid.edges_px]) / radius_px
     turn = evidence.turn_degrees
-    told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
     depth = np.sqrt(max(whole**2 - edges**2, 0.0)) / np.sin(np.radians(np.clip(turn, 1.0, 90.0)))
     if depth > FAIR_DEPTH or whole > FAIR_CHANGE:
-        yield Verdict("poor" if depth > POOR_DEPTH or whole > POOR_CHANGE else "fair", f"{told}; film it turning more")
+        told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
+        yield Verdict("poor" if whole > POOR_CHANGE else "fair", f"{told}; film it turning more")
     deep, half = relief(motion.shape), evidence.relief
     if max(deep, half) > OTHERWISE_DEEP * min(deep, half):
         told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"

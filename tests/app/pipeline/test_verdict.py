@@ -7,7 +7,8 @@ from typing import cast
 import numpy as np
 import pytest
 
-from app.pipeline.quality.verdict import Course, longest, verdict
+from app.pipeline.quality.course import Course
+from app.pipeline.quality.verdict import longest, verdict
 from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.sheet import IsometricSheet
@@ -17,7 +18,7 @@ from reconstruction.mapping.solid.solid import relief
 
 REST = RestShape("rigid", RigidMotion(100 * np.tile(np.eye(3, 9), 3), np.eye(3)[None], np.ones(1), np.zeros((1, 2))), "")
 LEFT = Misfit(0.3, 0.3)
-EVIDENCE = Evidence("solid", LEFT, LEFT, LEFT, 0.005, 2.0, 30.0, relief(REST.motion.shape))
+EVIDENCE = Evidence(Misfit(2.0, 2.0), LEFT, 30.0, relief(REST.motion.shape), "solid", LEFT, 0.005, 2.0)
 SOLID = Map(REST, Camera(), evidence=EVIDENCE)
 
 
@@ -86,10 +87,10 @@ def test_what_may_as_well_be_something_else() -> None:
 @pytest.mark.parametrize(
     ("whole_px", "edges_px", "turn_degrees", "grade"),
     [(1.5, 0.5, 60.0, "fair"), (1.5, 0.5, 5.0, "poor"), (0.5, 0.2, 60.0, "good"), (0.5, 0.2, 12.0, "fair"),
-     (1.5, 1.5, 20.0, "good"), (2.5, 2.5, 60.0, "fair"), (1.9, 0.5, 60.0, "fair"), (1.9, 0.5, 30.0, "poor"),
+     (1.5, 1.5, 30.0, "good"), (1.5, 1.5, 20.0, "poor"), (2.5, 2.5, 60.0, "fair"), (1.9, 0.5, 60.0, "fair"),
      (4.6, 4.0, 60.0, "poor")],
-    ids=["changes", "and hardly turns", "hardly changes", "nor turns", "noise", "much of it", "changes much",
-         "and turns less", "is no solid"],
+    ids=["changes", "and hardly turns", "hardly changes", "nor turns", "noise", "and hardly a turn", "much of it",
+         "changes much", "is no solid"],
 )  # fmt: skip
 def test_the_depth_of_a_solid_that_changes(whole_px: float, edges_px: float, turn_degrees: float, grade: str) -> None:
     seen = replace(EVIDENCE, solid=Misfit(edges_px, whole_px), turn_degrees=turn_degrees)
@@ -118,6 +119,16 @@ class Sheet:
     @property
     def warps(self) -> SimpleNamespace:
         return SimpleNamespace(weights=np.ones((30, self.points)))
+
+
+def test_a_sheet_that_stretches_while_nothing_turns_may_be_anything() -> None:
+    still = replace(EVIDENCE, kind="sheet", flat=Misfit(0.5, 0.5), turn_degrees=10.0)
+    for stretch, grade in ((0.008, "poor"), (0.003, "fair")):
+        sheet = cast(IsometricSheet, Sheet(stretch=stretch))
+        found = Map(replace(REST, kind="isometric"), Camera(500.0), sheet, evidence=still)
+        said = verdict(course([0.003] * 50), found)
+        assert said.grade == grade
+        assert "turned by 10° alone" in said.reason
 
 
 @pytest.mark.parametrize(

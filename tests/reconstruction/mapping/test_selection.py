@@ -75,9 +75,9 @@ def test_orthographic_keyframes_are_told_without_a_sheet():
 
 @given(st.floats(0.01, 100))
 def test_what_leaves_least_wins_and_freedom_costs(unit):
-    def decided(flat, solid, sheet, relief=0.4, stretch=0.0):
+    def decided(flat, solid, sheet, relief=0.4, stretch=0.0, turn=30.0):
         made = [Misfit(unit * edges, unit * whole) for edges, whole in (flat, solid)]
-        return decide(Rigid(*made, 30.0, relief), Misfit(unit * sheet, np.nan), stretch)[0]
+        return decide(Rigid(*made, turn, relief), Misfit(unit * sheet, np.nan), stretch)[0]
 
     assert decided((1, 1), (1, 0.95), 0.95) == "flat"
     assert decided((1, 2), (0.5, 1), 0.48) == "solid"
@@ -86,6 +86,9 @@ def test_what_leaves_least_wins_and_freedom_costs(unit):
     assert decided((1, 2), (0.5, 1), np.nan) == "solid"
     assert decided((2, 4), (0.7, 2), 0.4, stretch=0.015) == "solid"  # a face that talks
     assert decided((1, 2), (0.95, 1.9), 0.4, stretch=0.015) == "sheet"  # cloth
+    assert decided((0.5, 0.8), (0.4, 0.6), 0.4, turn=5.0) == "sheet"  # a curtain that moves a little
+    assert decided((0.5, 0.8), (0.4, 0.6), 0.4, turn=30.0) == "solid"
+    assert decided((0.4, 0.7), (0.3, 0.28), 0.34, turn=5.0) == "solid"  # a can that hardly turns
 
 
 def test_a_kind_that_only_the_freedom_of_another_decides_is_in_doubt():
