@@ -32,7 +32,9 @@ def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
     near = map_of(W, visible, lens(W, USUAL_LENS), estimate_focal=True, kind=kind)
     if near and not near.sheet:  # its evidence is by the focal length assumed
         near = map_of(W, visible, near.camera, estimate_focal=False, kind=kind)
-    return near.camera if parallel and near and changes(near, parallel) < CLEARLY * changes(parallel, near) else Camera()
+    if not (parallel and near and near.evidence and near.evidence.proven):
+        return Camera()
+    return near.camera if changes(near, parallel) < CLEARLY * changes(parallel, near) else Camera()
 
 
 def changes(one: Map, other: Map) -> float:

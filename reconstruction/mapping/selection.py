@@ -41,8 +41,9 @@ SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
 LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
 SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave so many times less than anything rigid, ...
 STRETCH_FREEDOM = 150.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane
-# A solid that turns less, while its relief explains less of what a plane leaves, is not proven: what deforms seems to turn.
-HARDLY_TURNED, EXPLAINED = 25.0, 2.4  # degrees; times
+# A solid that turns less is not proven, unless its relief explains so many times what neighbours share of what it leaves
+# over, in squares: what deforms seems to turn, too.
+HARDLY_TURNED, EXPLAINED = 25.0, 5.0
 PLAIN = 2.0  # sureness that leaves no doubt: one half of the keyframes is enough to test rigid shapes by
 SIGMAS = 1.1774  # median of a Rayleigh distribution
 HALF_NORMAL = 0.6745  # median of a half-normal one
@@ -78,7 +79,8 @@ class Rigid:
     @property
     def proven(self) -> bool:
         """Whether the solid turns so far, or explains so much, that its depth is no guess."""
-        return self.turn_degrees >= HARDLY_TURNED or self.flat.whole_px > EXPLAINED * self.solid.whole_px
+        left, shared = self.solid.whole_px**2, self.solid.whole_px**2 - self.solid.edges_px**2
+        return self.turn_degrees >= HARDLY_TURNED or self.flat.whole_px**2 - left > EXPLAINED * max(shared, 0.0)
 
 
 @dataclass(frozen=True)
@@ -160,10 +162,10 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     gain = max(flat.whole_px, 1e-300) / max(SOLID_FREEDOM * solid.whole_px, 1e-300)
     best: Kind = "solid" if gain > 1 and rigid.relief > LEAST_RELIEF else "flat"
     rigid_px, least = solid.edges_px if best == "solid" else min(flat.edges_px, solid.edges_px), SHEET_FREEDOM
-    if not rigid.proven:
-        rigid_px, least = min(flat.whole_px, solid.whole_px), 1.0
-    better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
     explained = max(0.0, 1 - (solid.edges_px / max(flat.edges_px, 1e-300)) ** 2)  # by relief, of what a plane leaves
+    if not rigid.proven:
+        rigid_px, least, explained = min(flat.whole_px, solid.whole_px), 1.0, 1.0
+    better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
     freedom = least + STRETCH_FREEDOM * stretch * explained
     if freedom * better < 1:
         return "sheet", float(1 / (freedom * better))

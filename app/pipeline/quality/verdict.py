@@ -176,7 +176,7 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
-    if made and not found.evidence.proven:
+    if made and not found.evidence.proven and (made == "solid" or found.evidence.sureness < PLAIN):
         told = f"turned by {found.evidence.turn_degrees:.0f}° alone, it shows hardly more of its depth than of its changes"
         keeps_lengths = found.sheet is not None and found.sheet.stretch < MOST_STRETCH
         yield Verdict("fair" if keeps_lengths else "poor", f"{told}: how deep it is is a guess; film it turning more")
