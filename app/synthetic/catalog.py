@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from app.arrays import Array
 from app.synthetic import sheet, solid
@@ -57,6 +58,23 @@ def waving(slope_rad: float) -> Maker:
         return shape
 
     return maker
+
+
+def swaying(rng: np.random.Generator) -> Shape:
+    """A curtain: cloth that hangs from a rod, turned a little away, with folds that the draught moves; it stretches a little."""
+    side, (a, b, c) = rng.uniform(0.3, 0.5) * rng.choice([-1, 1]), rng.uniform(0, 2 * np.pi, 3)
+    turned = Rotation.from_rotvec([0.0, side, 0.0]).as_matrix()
+
+    def shape(places: Array, time: float) -> Array:
+        t = 4 * np.pi * time
+        down = 0.2 + 0.8 * (places[:, 1:] / np.ptp(places[:, 1]) + 0.5)  # folds grow away from the rod
+        pulled = places * (1.0, 1.0 + 0.03 * np.sin(1.5 * t + c))
+        folds = sheet.bent(
+            pulled, 0.2, lambda arc: 0.12 * np.sin(2 * np.pi * arc / 0.9 + t + a) + 0.1 * np.sin(1.3 * t + b)
+        )
+        return np.asarray((np.append(pulled, 0 * down, axis=1) * (1 - down) + folds * down) @ turned.T)
+
+    return shape
 
 
 def rolling(rng: np.random.Generator) -> Shape:
@@ -141,6 +159,7 @@ KINDS = {
     "waving-7": Kind("sheet", waving(0.7), SHEET_TURN),
     "waving-9": Kind("sheet", waving(0.9), SHEET_TURN),
     "rolling": Kind("sheet", rolling, SHEET_TURN),
+    "curtain": Kind("sheet", swaying, (0.5, 1.0)),
     "cone": Kind("sheet", coning, SHEET_TURN, held_back=True),
     "crease": Kind("sheet", creasing, SHEET_TURN, held_back=True),
     "card": Kind("flat", still(flat), SOLID_TURN),

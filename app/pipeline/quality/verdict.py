@@ -176,10 +176,10 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
-    if made and not found.evidence.proven and (made == "solid" or found.evidence.sureness < PLAIN):
+    if made and not found.evidence.proven:
         told = f"turned by {found.evidence.turn_degrees:.0f}° alone, it shows hardly more of its depth than of its changes"
-        keeps_lengths = found.sheet is not None and found.sheet.stretch < MOST_STRETCH
-        yield Verdict("fair" if keeps_lengths else "poor", f"{told}: how deep it is is a guess; film it turning more")
+        is_sheet = found.sheet is not None and (found.sheet.stretch < MOST_STRETCH or found.evidence.sureness > PLAIN)
+        yield Verdict("fair" if is_sheet else "poor", f"{told}: how deep it is is a guess; film it turning more")
     if found.rest.kind == "rigid":
         yield from of_solid(found.rest.motion, found.evidence)
         rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
