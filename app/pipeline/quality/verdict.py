@@ -15,7 +15,7 @@ from app.pipeline.quality.course import Course
 from reconstruction.basis.rest_shape import RigidMotion, rms_radius
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
-from reconstruction.mapping.selection import PLAIN, Evidence
+from reconstruction.mapping.selection import HARDLY_TURNED, PLAIN, Evidence
 from reconstruction.mapping.solid.solid import relief
 
 Grade = Literal["good", "fair", "poor"]
@@ -176,10 +176,13 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
-    if made and not found.evidence.proven:
-        told = f"turned by {found.evidence.turn_degrees:.0f}° alone, it shows hardly more of its depth than of its changes"
+    turn, proven = found.evidence.turn_degrees, found.evidence.proven
+    if made and (not proven or (found.deformations is not None and turn < HARDLY_TURNED)):
+        told = (
+            f"turned by {turn:.0f}° alone, it shows hardly more of its depth than of its changes: how deep it is is a guess"
+        )
         is_sheet = found.sheet is not None and (found.sheet.stretch < MOST_STRETCH or found.evidence.sureness > PLAIN)
-        yield Verdict("fair" if is_sheet else "poor", f"{told}: how deep it is is a guess; film it turning more")
+        yield Verdict("fair" if proven or is_sheet else "poor", f"{told}; film it turning more")
     if found.rest.kind == "rigid":
         yield from of_solid(found.rest.motion, found.evidence)
         rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())

@@ -14,6 +14,7 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.selection import Evidence, Misfit
+from reconstruction.mapping.solid.deforming.deformations import Deformations
 from reconstruction.mapping.solid.solid import relief
 
 REST = RestShape("rigid", RigidMotion(100 * np.tile(np.eye(3, 9), 3), np.eye(3)[None], np.ones(1), np.zeros((1, 2))), "")
@@ -119,6 +120,16 @@ class Sheet:
     @property
     def warps(self) -> SimpleNamespace:
         return SimpleNamespace(weights=np.ones((30, self.points)))
+
+
+def test_what_deforms_may_seem_to_turn() -> None:
+    deforms = replace(SOLID, deformations=cast(Deformations, object()))
+    assert verdict(course([0.003] * 50), deforms).grade == "good"
+    hardly = replace(EVIDENCE, turn_degrees=14.0)
+    assert verdict(course([0.003] * 50), replace(SOLID, evidence=hardly)).grade == "good"
+    said = verdict(course([0.003] * 50), replace(deforms, evidence=hardly))
+    assert said.grade == "fair"
+    assert "turned by 14° alone" in said.reason
 
 
 def test_a_sheet_that_stretches_while_nothing_turns_may_be_anything() -> None:
