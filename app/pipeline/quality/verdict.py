@@ -41,6 +41,7 @@ FAIR_CHANGE, POOR_CHANGE = 0.028, 0.05  # the same with noise, over the radius a
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
+MOSTLY = 2.4  # times what a solid leaves over a plane must, if it hardly turns: rigid ones, turned by 8°, have 2.9 and more
 RECOVERED = ("rigid", "plane")  # by the first frames
 BY_KEYFRAMES = {"isometric": "sheet", "rigid": "solid"}  # kinds of rest shapes, in words
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
@@ -177,7 +178,8 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
     turn, proven = found.evidence.turn_degrees, found.evidence.proven
-    if made and (not proven or (found.deformations is not None and turn < HARDLY_TURNED)):
+    changes = found.deformations is not None or found.evidence.flat.whole_px < MOSTLY * found.evidence.solid.whole_px
+    if made and (not proven or (changes and turn < HARDLY_TURNED)):
         told = (
             f"turned by {turn:.0f}° alone, it shows hardly more of its depth than of its changes: how deep it is is a guess"
         )
