@@ -41,6 +41,7 @@ FAIR_CHANGE, POOR_CHANGE = 0.028, 0.05  # the same with noise, over the radius a
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
+SURELY = 2.4  # sureness of a sheet that nothing turns: cloth that stretches has up to 2.1, rolled paper 2.7 and more
 MOSTLY = 2.4  # times what a solid leaves over a plane must, if it hardly turns: rigid ones, turned by 8°, have 2.9 and more
 RECOVERED = ("rigid", "plane")  # by the first frames
 BY_KEYFRAMES = {"isometric": "sheet", "rigid": "solid"}  # kinds of rest shapes, in words
@@ -179,12 +180,13 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
     turn, proven = found.evidence.turn_degrees, found.evidence.proven
     changes = found.deformations is not None or found.evidence.flat.whole_px < MOSTLY * found.evidence.solid.whole_px
-    if made and (not proven or (changes and turn < HARDLY_TURNED)):
+    surely_bends = found.sheet is not None and found.evidence.sureness > SURELY
+    if made and not surely_bends and (not proven or (changes and turn < HARDLY_TURNED)):
         told = (
             f"turned by {turn:.0f}° alone, it shows hardly more of its depth than of its changes: how deep it is is a guess"
         )
-        is_sheet = found.sheet is not None and (found.sheet.stretch < MOST_STRETCH or found.evidence.sureness > PLAIN)
-        yield Verdict("fair" if proven or is_sheet else "poor", f"{told}; film it turning more")
+        keeps_lengths = found.sheet is not None and found.sheet.stretch < MOST_STRETCH
+        yield Verdict("fair" if proven or keeps_lengths else "poor", f"{told}; film it turning more")
     if found.rest.kind == "rigid":
         yield from of_solid(found.rest.motion, found.evidence)
         rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
