@@ -178,15 +178,8 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     if found.evidence.sureness < TOSS_UP:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
-    turn, proven = found.evidence.turn_degrees, found.evidence.proven
-    changes = found.deformations is not None or found.evidence.flat.whole_px < MOSTLY * found.evidence.solid.whole_px
-    surely_bends = found.sheet is not None and found.evidence.sureness > SURELY
-    if made and not surely_bends and (not proven or (changes and turn < HARDLY_TURNED)):
-        told = (
-            f"turned by {turn:.0f}° alone, it shows hardly more of its depth than of its changes: how deep it is is a guess"
-        )
-        keeps_lengths = found.sheet is not None and found.sheet.stretch < MOST_STRETCH
-        yield Verdict("fair" if proven or keeps_lengths else "poor", f"{told}; film it turning more")
+    if made:
+        yield from of_turn(found, found.evidence)
     if found.rest.kind == "rigid":
         yield from of_solid(found.rest.motion, found.evidence)
         rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
@@ -194,6 +187,18 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
             yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
     if found.sheet is not None:
         yield from of_sheet(found.sheet, found.evidence, perspective=found.camera.perspective)
+
+
+def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:
+    """What a small turn says: what deforms seems to turn, too."""
+    changes = found.deformations is not None or evidence.flat.whole_px < MOSTLY * evidence.solid.whole_px
+    surely_bends = found.sheet is not None and evidence.sureness > SURELY
+    if surely_bends or (evidence.proven and (evidence.turn_degrees >= HARDLY_TURNED or not changes)):
+        return
+    told = f"turned by {evidence.turn_degrees:.0f}° alone, it shows hardly more of its depth than of its changes"
+    keeps_lengths = found.sheet is not None and found.sheet.stretch < MOST_STRETCH
+    grade: Grade = "fair" if evidence.proven or keeps_lengths else "poor"
+    yield Verdict(grade, f"{told}: how deep it is is a guess; film it turning more")
 
 
 def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
