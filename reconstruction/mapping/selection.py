@@ -150,9 +150,8 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
 def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     """The kind, and how many times more the next best leaves.
 
-    Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges. Cloth stretches a little,
-    and its waves are no relief that lasts; a face that talks passes for a sheet that stretches, but has one. Without proof of
-    that, something rigid must explain the whole, and a sheet pays for all of its stretching.
+    Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges, if they are proven. Cloth
+    stretches a little, and its waves are no relief that lasts; a face that talks passes for a sheet that stretches, but has one.
 
     Args:
         rigid: what rigid shapes leave over.
@@ -164,7 +163,7 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     best: Kind = "solid" if gain > 1 and rigid.relief > LEAST_RELIEF else "flat"
     rigid_px, least = solid.edges_px if best == "solid" else min(flat.edges_px, solid.edges_px), SHEET_FREEDOM
     explained = max(0.0, 1 - (solid.edges_px / max(flat.edges_px, 1e-300)) ** 2)  # by relief, of what a plane leaves
-    if not rigid.proven:
+    if not rigid.proven:  # all of its stretching speaks against a sheet, too
         rigid_px, least, explained = min(flat.whole_px, solid.whole_px), 1.0, 1.0
     better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
     freedom = least + STRETCH_FREEDOM * stretch * explained
