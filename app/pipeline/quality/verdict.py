@@ -37,7 +37,7 @@ POOR_LENGTHS = 0.07  # change of them from half to half of the keyframes: sheets
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 # What a rigid shape leaves over and neighbours share, which is no noise, over its radius and the sine of its turn: as much
 FAIR_DEPTH = 0.0125  # its depth may be off, and more
-FAIR_CHANGE, POOR_CHANGE = 0.028, 0.05  # the same with noise, over the radius alone: what changes is no longer small
+FAIR_CHANGE, POOR_CHANGE = 0.028, 0.04  # the same with noise, over the radius alone: what changes is no longer small
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
