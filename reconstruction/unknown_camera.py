@@ -32,7 +32,7 @@ def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
     near = map_of(W, visible, lens(W, USUAL_LENS), estimate_focal=True, kind=kind)
     if near and not near.sheet:  # its evidence is by the focal length assumed
         near = map_of(W, visible, near.camera, estimate_focal=False, kind=kind)
-    if not (parallel and near and near.evidence and near.evidence.proven):
+    if not (parallel and near and near.evidence and near.evidence.proven):  # unproven, a sheet always changes less
         return Camera()
     return near.camera if changes(near, parallel) < CLEARLY * changes(parallel, near) else Camera()
 
