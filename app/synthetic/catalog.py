@@ -68,9 +68,10 @@ def swaying(rng: np.random.Generator) -> Shape:
     def shape(places: Array, time: float) -> Array:
         t = 4 * np.pi * time
         drawn = places * (1.0, 1.0 + 0.03 * np.sin(1.5 * t + c))
+        level = flat(drawn)
         folds = sheet.bent(drawn, 0.2, lambda arc: 0.12 * np.sin(2 * np.pi * arc / 0.9 + t + a) + 0.1 * np.sin(1.3 * t + b))
         below = 0.6 + 1.1 * places[:, 1:]
-        return np.asarray((flat(drawn) + below * (folds - flat(drawn))) @ turned.T)
+        return np.asarray((level + below * (folds - level)) @ turned.T)
 
     return shape
 

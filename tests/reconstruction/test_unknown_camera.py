@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from reconstruction.camera import Camera
+from reconstruction.mapping.selection import Evidence
 from reconstruction.unknown_camera import likely_camera
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
@@ -34,6 +35,14 @@ def test_of_a_sheet() -> None:
     assert found.focal_px == pytest.approx(CAMERA.focal_px, rel=0.15)
     parallel = 200 * S[:, :2] + 0.1 * rng.normal(size=W.shape)
     assert not likely_camera(np.where(visible[:, None], parallel, np.nan), visible).perspective
+
+
+def test_what_is_not_proven_tells_no_camera(monkeypatch: pytest.MonkeyPatch) -> None:
+    W, everything = solid_seen(PERSPECTIVE), np.ones((FRAMES, POINTS), bool)
+    monkeypatch.setattr(Evidence, "proven", True)
+    assert likely_camera(W, everything).perspective
+    monkeypatch.setattr(Evidence, "proven", False)
+    assert not likely_camera(W, everything).perspective
 
 
 def test_few_frames_do_not_tell() -> None:

@@ -36,7 +36,8 @@ POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found th
 POOR_LENGTHS = 0.07  # change of them from half to half of the keyframes: sheets have up to 4.5 %, things with limbs 8 %
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 # What a rigid shape leaves over and neighbours share, which is no noise, over its radius and the sine of its turn: as much
-FAIR_DEPTH = 0.0125  # its depth may be off, and more
+# its depth may be off, and more.
+FAIR_DEPTH = 0.0125
 FAIR_CHANGE, POOR_CHANGE = 0.028, 0.04  # the same with noise, over the radius alone: what changes is no longer small
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
@@ -193,7 +194,7 @@ def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     """What a small turn says: what deforms seems to turn, too."""
     changes = found.deformations is not None or evidence.flat.whole_px < MOSTLY * evidence.solid.whole_px
     surely_bends = found.sheet is not None and evidence.sureness > SURELY
-    if surely_bends or (evidence.proven and (evidence.turn_degrees >= HARDLY_TURNED or not changes)):
+    if evidence.turn_degrees >= HARDLY_TURNED or surely_bends or (evidence.proven and not changes):
         return
     told = f"turned by {evidence.turn_degrees:.0f}° alone, it shows hardly more of its depth than of its changes"
     keeps_lengths = found.sheet is not None and found.sheet.stretch < MOST_STRETCH

@@ -88,10 +88,10 @@ def test_what_may_as_well_be_something_else() -> None:
 @pytest.mark.parametrize(
     ("whole_px", "edges_px", "turn_degrees", "grade"),
     [(1.5, 0.5, 60.0, "fair"), (1.5, 0.5, 5.0, "poor"), (0.5, 0.2, 60.0, "good"), (0.5, 0.2, 12.0, "fair"),
-     (1.5, 1.5, 30.0, "good"), (1.9, 1.9, 60.0, "fair"), (1.9, 0.5, 60.0, "fair"),
-     (4.6, 4.0, 60.0, "poor")],
-    ids=["changes", "and hardly turns", "hardly changes", "nor turns", "noise", "much of it",
-         "changes much", "is no solid"],
+     (1.5, 1.5, 30.0, "good"), (1.9, 1.9, 60.0, "fair"), (1.9, 0.5, 60.0, "fair"), (1.9, 0.5, 30.0, "fair"),
+     (2.5, 2.5, 60.0, "poor"), (4.6, 4.0, 60.0, "poor")],
+    ids=["changes", "and hardly turns", "hardly changes", "nor turns", "noise", "much of it", "changes much",
+         "and turns less", "too much", "is no solid"],
 )  # fmt: skip
 def test_the_depth_of_a_solid_that_changes(whole_px: float, edges_px: float, turn_degrees: float, grade: str) -> None:
     seen = replace(EVIDENCE, solid=Misfit(edges_px, whole_px), turn_degrees=turn_degrees)
