@@ -26,8 +26,6 @@ from reconstruction.window.energy import build_energy, build_guide
 from reconstruction.window.priors import Weights
 from reconstruction.window.window import SlidingWindow
 
-CATCH_UP = 4  # most frames whose shapes are found with one observation, where models are made meanwhile
-
 
 class Phase(Enum):
     """What the estimator is doing."""
@@ -154,7 +152,7 @@ class Reconstruction:
         if found is not None:
             self.revisions += self.window is not None
             self._adopt(found)
-        return self._advance(CATCH_UP if self._mapper and self._mapper.latency else len(self._waiting))
+        return self._advance(self._mapper.at_a_time if self._mapper else len(self._waiting))
 
     def restart(self) -> None:
         """The surface was lost and is seen again, somewhere else: keep the model, forget the last frames."""

@@ -1,5 +1,6 @@
 """Mapping while frames come: the first model, and another one whenever the views have grown."""
 
+import sys
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
@@ -20,6 +21,7 @@ from reconstruction.settings import FIRST_LOOKS, Settings
 
 LATENCY = 90  # frames after which a map that another process makes is in force: three seconds of most videos
 FIRST_LATENCY = 0.25  # the same of a first model, of the frames it is made of: it takes a fraction of the time
+CATCH_UP, LIVE_CATCH_UP = 4, 2  # frames that get their shapes with each new one; live ones come on time meanwhile
 FEWEST = 10  # keyframes for a map
 MORE = 2  # times as many keyframes of a solid at the end: what deforms must be seen from many sides
 FEWEST_POINTS = 4  # that a frame shows, for a first model
@@ -50,6 +52,7 @@ class Mapper:
     Attributes:
         start, latency: the same.
         first_frames: so many gave the first model.
+        at_a_time: most frames that are given shapes with a new one, once there is a model: all, if nothing goes on meanwhile.
     """
 
     def __init__(
@@ -63,6 +66,7 @@ class Mapper:
         given: RestShape | None = None,
     ) -> None:
         self._settings, self.start, self.latency, self._live = settings, start, latency, live
+        self.at_a_time = (LIVE_CATCH_UP if live else CATCH_UP) if latency else sys.maxsize
         self._frames = np.inf if frames is None else frames
         self._given = given
         refined = settings.refine_rest and settings.deformation in ("auto", "inextensible")

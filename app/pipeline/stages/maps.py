@@ -5,8 +5,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, Self
 
-from app.processes.child import NICE, connection_to_parent
+from app.processes.child import connection_to_parent
 from app.processes.remote import Remote, packed, serve
+
+NICE = 19  # of the process: it takes what all others leave
 
 
 class MapProcess:
