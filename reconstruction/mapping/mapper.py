@@ -52,7 +52,7 @@ class Mapper:
     Attributes:
         start, latency: the same.
         first_frames: so many gave the first model.
-        at_a_time: most frames that are given shapes with a new one, once there is a model: all, if nothing goes on meanwhile.
+        at_a_time: most frames that get shapes with a new one, once there is a model: all, if nothing goes on meanwhile.
     """
 
     def __init__(
