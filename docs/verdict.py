@@ -1,4 +1,4 @@
-"""Writes docs/verdict.md: what the words of a verdict are worth, by cases with a truth. Takes a quarter of an hour.
+"""Writes docs/verdict.md: what verdicts and standard deviations are worth, by cases with a truth. Takes a quarter of an hour.
 
 .venv/bin/python -m docs.verdict ../shared/data
 """
@@ -7,10 +7,11 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from app.options.evaluate import Evaluate
@@ -32,6 +33,8 @@ DAMAGED = ("waving-5", "waving-9", "rolling", "box", "head", "balloon")
 SHARED = ("waving_3", "waving_5", "waving_7", "waving_9", "flag250", "flag250_perspective", "face37")
 PAPER_RANGES = ("0:113", "40:113", "80:113", "136:191", ":")
 GOOD, BAD = 0.03, 0.05  # of e3d
+SURE = Model(uncertainty=True)
+CALIBRATED = 0.5, 2.0  # of the error over its standard deviation
 
 
 @dataclass(frozen=True)
@@ -52,7 +55,7 @@ def made_up(folder: Path, seed: int) -> Iterator[Case]:
             path = folder / "tracks.npz"
             with path.open("wb") as file:
                 tracks(one, damage).save(file)  # noqa: B023
-            config = Evaluate(path, model=Model(revise=maps), final_pass=maps)
+            config = Evaluate(path, model=replace(SURE, revise=maps), final_pass=maps)
             return Case(f"{one.name}{told}", one.seed >= HELD_SEEDS, scored(config))  # noqa: B023
 
         yield case(USUAL, "")
@@ -65,9 +68,11 @@ def shared(data: Path) -> Iterator[Case]:
     """Sequences of others."""
     for name in SHARED:
         path = data / f"{name}.npz"
-        yield Case(name, False, scored(Evaluate(path)))
-        yield Case(f"{name}, 40 % missing, 10 % gross errors", False, scored(Evaluate(path, missing=0.4, outliers=0.1)))
-        yield Case(f"{name}, 80 % missing", False, scored(Evaluate(path, missing=0.8)))
+        yield Case(name, False, scored(Evaluate(path, model=SURE)))
+        yield Case(
+            f"{name}, 40 % missing, 10 % gross errors", False, scored(Evaluate(path, model=SURE, missing=0.4, outliers=0.1))
+        )
+        yield Case(f"{name}, 80 % missing", False, scored(Evaluate(path, model=SURE, missing=0.8)))
     for frames in PAPER_RANGES:
         config = Run(
             str(data / "kinect_paper.mp4"),
@@ -75,6 +80,7 @@ def shared(data: Path) -> Iterator[Case]:
             frames=frames,
             ground_truth=data / "kinect_paper_gt.npz",
             jobs=1,
+            model=SURE,
             output=Output(out=Path(tempfile.gettempdir(), "verdict.rrd"), overwrite=True, image="none"),
         )
         yield Case(f"kinect_paper, frames {frames}", frames == "136:191", dict(Session(config, Part()).run().as_dict()))
@@ -94,18 +100,24 @@ def page(cases: list[Case]) -> str:
 
     def row(grade: str, chosen: list[Case]) -> tuple[object, ...]:
         errors = [case.words["e3d"] for case in chosen if case.words["verdict"] == grade]
-        share = [f"{sum(map(rule, errors)) / len(errors):.0%}" if errors else None for rule in (is_good, is_bad)]
-        return (grade, len(errors), *share)
+        ratios = [over_sigma(case) for case in chosen if case.words["verdict"] == grade]
+        least, most = CALIBRATED
+        counts = sum(map(is_good, errors)), sum(map(is_bad, errors)), sum(least <= ratio <= most for ratio in ratios)
+        return (grade, len(errors), *(f"{count / len(errors):.0%}" if errors else None for count in counts))
 
-    columns = ("verdict", "cases", "e3d ≤ 3 %", "e3d > 5 %")
+    columns = ("verdict", "cases", "e3d ≤ 3 %", "e3d > 5 %", "error over σ from ½ to 2")
     held_back = [case for case in scores if case.held_back]
-    every = [(case.name, 100 * case.words["e3d"], case.words["verdict"], case.words["verdict_reason"]) for case in scores]
+    every = [
+        (case.name, 100 * case.words["e3d"], over_sigma(case), case.words["verdict"], case.words["verdict_reason"])
+        for case in scores
+    ]
     rule = Path("app/pipeline/quality/verdict.py")
     return "\n".join(
         [
             "# What a verdict is worth\n",
             f"Every run ends with `good`, `fair` or `poor`, by thresholds in `{rule}` on what is known without the truth: "
             "residuals over the picture's size and their course, points seen, and what keyframes say of the model. "
+            "σ are the [standard deviations](uncertainty.md) of `--uncertainty`, by no case fitted. "
             "Written by `python -m docs.verdict`.\n",
             markdown_table(columns, [row(grade, scores) for grade in reversed(GRADES)]),
             f"The same for seeds from {HELD_SEEDS} on and `kinect_paper` from 136 on, which no threshold was chosen on; "
@@ -115,9 +127,14 @@ def page(cases: list[Case]) -> str:
             "those on solids that change by heads and hearts, those here among them.\n",
             markdown_table(columns, [row(grade, held_back) for grade in reversed(GRADES)]),
             "All of them, best first:\n",
-            markdown_table(("case", "e3d %", "verdict", "reason"), sorted(every, key=lambda one: one[1])),
+            markdown_table(("case", "e3d %", "error over σ", "verdict", "reason"), sorted(every, key=lambda one: one[1])),
         ]
     )
+
+
+def over_sigma(case: Case) -> float:
+    """How far off shapes are over how far they are said to be, the median frame; NaN where nothing is said."""
+    return float(case.words.get("error_over_sigma") or np.nan)
 
 
 def is_good(e3d: float) -> bool:
