@@ -13,11 +13,10 @@ from reconstruction.basis.mesh import Mesh, ratio_of_sizes
 from reconstruction.basis.model import Model, build_model
 from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, medoid
 from reconstruction.camera import Camera, lens, nearest_rotation
-from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, sheet
-from reconstruction.mapping.isometric.bundle import FUNCTIONS
+from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, refined, sheet
 from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
-from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.selection import Evidence, Kind, select
 from reconstruction.mapping.solid.deforming.deformations import Deformations
 from reconstruction.mapping.solid.deforming.freedom import modes_held
@@ -28,8 +27,10 @@ from reconstruction.state import State
 
 FEWEST_KEYFRAMES, FEWEST_POINTS = 6, 20
 LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
+COARSE = (
+    0.0028  # change of lengths between a sheet's bundled shapes: more, and their functions are too coarse for its bends
+)
 ASSUMED = "focal length {:.0f} px assumed: give it if you know better"
-MOST_STRETCH = 0.018  # change of a sheet's lengths at the end, noise apart: of creases and cloth 1 %, else it is none
 
 
 @dataclass(frozen=True)
@@ -170,18 +171,18 @@ def map_of(
             W,
             visible,
             camera,
-            lambda parts: ([through(by_part(whole(), part), W[part]) for part in parts], whole().strain_beyond_noise),
+            lambda parts: ([by_part(whole(), part).both(W[part]) for part in parts], whole().strain_beyond_noise),
             start,
         )
         made = kind or evidence.kind
         if made == "flat" or (given is not None and made != "sheet"):
             return None
-        found, by, patient = None, (W, visible), last is not None
+        by, patient = (W, visible), last is not None
         if made == "sheet":
-            found = sheet_map(W, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=patient)
-            if kind is None and given is None and found.sheet and found.sheet.strain_beyond_noise > MOST_STRETCH:
-                found, evidence = None, replace(evidence, kind="solid")
-        if found is None:
+            found = sheet_map(
+                W, visible, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=patient
+            )
+        else:
             by = last() if last else by
             found = solid_map(*by, camera, evidence, estimate_focal=estimate_focal, known=known, last=patient)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
@@ -191,11 +192,6 @@ def map_of(
     source = f"{len(by[0])} keyframes" if found.sheet else f"{len(by[0])} keyframes and what is usual"
     told = ASSUMED.format(focal_px) if assumed else f"focal length {focal_px:.0f} px, from {source}"
     return replace(found, seen=by[1], focal_note=told if estimate_focal and camera.perspective else "")
-
-
-def through(found: IsometricSheet, W: Array) -> tuple[Array, Array]:
-    """Shapes (K, 3, p) of a sheet in its keyframes, smooth, and through the points W (K, 2, p) px as they were seen."""
-    return found.shapes(), found.through(W)
 
 
 def solid_map(
@@ -214,6 +210,7 @@ def solid_map(
 
 def sheet_map(
     W: Array,
+    visible: Mask,
     camera: Camera,
     found: IsometricSheet,
     evidence: Evidence,
@@ -227,6 +224,8 @@ def sheet_map(
         found = under_its_focal_length(found) if estimate_focal else found
         camera = found.camera
     found = bundled(found, W, BUNDLE_ROUNDS if last else FEW_ROUNDS)
+    if last and camera.perspective and found.stretch > USUAL_STRETCH:
+        found = bundled(refined(found, W, visible), W)
     shapes = found.shapes()
     known = np.isfinite(shapes).all(axis=(0, 1))
     middle = medoid(shapes[:, :, known])
@@ -243,8 +242,7 @@ def sheet_map(
     t = (s * unit_px)[:, None] * origin[:, :2] + found.camera.center_px - camera.center_px
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, t)
     note = f"sheet from {len(shapes)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
-    # Its shapes are smooth and go by lengths: there is no noise that more modes would fit, and fewer than its functions
-    # cut off its bends; on the way they are faster.
+    # Its shapes hold no noise that more modes would fit; fewer than its functions cut off bends, but are faster on the way.
     note = note if given is None else f"{given.note}; {note}"
     shape = RestShape("isometric" if given is None else given.kind, motion, note)
-    return Map(shape, camera, found, unit_px, FUNCTIONS if last else MORE_MODES, evidence=evidence)
+    return Map(shape, camera, found, unit_px, found.shape_functions if last else MORE_MODES, evidence=evidence)

@@ -13,7 +13,7 @@ import numpy as np
 from app.arrays import Flags
 from app.pipeline.quality.course import Course
 from reconstruction.basis.rest_shape import RigidMotion, rms_radius
-from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
 from reconstruction.mapping.selection import HARDLY_TURNED, PLAIN, Evidence
 from reconstruction.mapping.solid.solid import relief
@@ -28,9 +28,6 @@ FAIR_ERROR, POOR_ERROR = 0.010, 0.018
 POOR_GUESS = 0.005
 # What is not seen is a guess by its neighbours.
 FAIR_SHARE, POOR_SHARE = 0.5, 0.3
-# Lengths of a sheet change by less between its shapes, which hold no noise. By more, they really do (a balloon, a crease),
-# and then no rest shape is right, or bends are finer than its functions.
-MOST_STRETCH = 0.0042
 FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
 POOR_LENGTHS = 0.07  # change of them from half to half of the keyframes: sheets have up to 4.5 %, things with limbs 8 %
@@ -197,7 +194,7 @@ def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     if evidence.turn_degrees >= HARDLY_TURNED or surely_bends or (evidence.proven and not changes):
         return
     told = f"turned by {evidence.turn_degrees:.0f}° alone, it shows hardly more of its depth than of its changes"
-    keeps_lengths = found.sheet is not None and found.sheet.stretch < MOST_STRETCH
+    keeps_lengths = found.sheet is not None and found.sheet.stretch < USUAL_STRETCH
     grade: Grade = "fair" if evidence.proven or keeps_lengths else "poor"
     yield Verdict(grade, f"{told}: how deep it is is a guess; film it turning more")
 
@@ -231,6 +228,6 @@ def of_sheet(found: IsometricSheet, evidence: Evidence, *, perspective: bool) ->
         yield Verdict(
             "poor", f"{told}: it may be no sheet, or it is lost in noise; draw the region tightly, film it sharper"
         )
-    elif found.stretch > MOST_STRETCH:
+    elif found.stretch > USUAL_STRETCH:
         why = f"its lengths change by {found.stretch:.1%}: it stretches, has creases, or fine folds"
         yield Verdict("fair", f"{why}; if it is a solid: --rest-shape solid")

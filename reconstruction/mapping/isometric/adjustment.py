@@ -24,13 +24,13 @@ from reconstruction.mapping.isometric.lengths import (
     usual,
 )
 from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_of, on_edges, rays_of
-from reconstruction.mapping.isometric.one_frame import DOUBTED, best_of_starts
+from reconstruction.mapping.isometric.one_frame import mended
 from reconstruction.mapping.isometric.shape_prior import FIRM, ROUGH
-from reconstruction.mapping.isometric.sheet import IsometricSheet
-from reconstruction.mapping.isometric.smooth_field import SmoothField, smooth_field
-from reconstruction.mapping.isometric.warps import Warps, smooth_warps
+from reconstruction.mapping.isometric.sheet import IsometricSheet, described
+from reconstruction.mapping.isometric.smooth_field import smooth_field
+from reconstruction.mapping.isometric.warps import Warps, finer, smooth_warps
 
-FUNCTIONS = 40
+FUNCTIONS, FINE_FUNCTIONS = 40, 60
 START_FRAMES = 10  # of the convex start
 BUNDLE_ROUNDS = 12  # of shapes, then places and lengths: with much noise they are still getting better
 FEW_ROUNDS = 2  # bring most of that in a tenth of a second
@@ -83,14 +83,13 @@ def on_smooth_images(warps: Warps, camera: Camera) -> IsometricSheet:
     """
     nodes = nodes_of(warps)
     field = smooth_field(nodes.reference, FUNCTIONS)
-    values = np.full((len(warps.placed), len(field.stiffness)), np.nan)
-    values[warps.placed] = field.at(warps.reference[:, warps.placed])
+    values = warps.values_of(field)
     seen = edges_between(nodes, on_edges(nodes, field), camera)
     c = first_depths(nodes, seen, values[nodes.points], field.stiffness, camera)
     factor, change = np.ones(len(nodes.ends)), np.inf
     for _ in range(ROUNDS):
         c, factor = again(nodes, seen, seen.weighted(factor), c, values[nodes.points], field.stiffness, camera)
-        before, found = change, described(warps, nodes, field, values, c, factor, camera)
+        before, found = change, described(warps, nodes, field, values, c, factor, camera, SOLVER.bend)
         change = found.strain_rms
         if change > (1 - LITTLE_GAIN) * before:
             break
@@ -104,7 +103,27 @@ def by_part(found: IsometricSheet, part: Indices) -> IsometricSheet:
     nodes = found.nodes.in_frames(part)
     edges = found.edges_in(nodes)
     c = adjust_depths(edges, found.coefficients[part], found.field.stiffness, SOLVER)
-    return described(found.warps.in_frames(part), nodes, found.field, found.values, c, found.edge_weights, found.camera)
+    warps = found.warps.in_frames(part)
+    return described(warps, nodes, found.field, found.values, c, found.edge_weights, found.camera, found.bend)
+
+
+def refined(found: IsometricSheet, W: Array, visible: Mask) -> IsometricSheet:
+    """The sheet of finer functions, and with more edges, started from its shapes: for bends that the usual ones cut off.
+
+    Args:
+        found: as above.
+        W: (F, 2, p) px, its keyframes; anything where not visible.
+        visible: (F, p).
+    """
+    warps = finer(found.warps, W, visible)
+    nodes = nodes_of(warps, fine=True)
+    field = smooth_field(nodes.reference, FINE_FUNCTIONS)
+    values = warps.values_of(field)
+    B, seen = values[nodes.points], edges_between(nodes, on_edges(nodes, field), found.camera)
+    c = found.coefficients @ found.values[nodes.points].T @ np.linalg.pinv(B).T
+    c, factor = once_more(seen, seen, c, field.stiffness)
+    c, factor = again(nodes, seen, seen.weighted(factor), c, B, field.stiffness, found.camera)
+    return described(warps, nodes, field, values, c, factor, found.camera, found.bend, fine=True)
 
 
 def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:
@@ -141,36 +160,6 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
             break
     C = mended(found, C, W, weights)
     return replace(found.with_shapes(C @ found.functions.T), usual_change=float(np.median(found.length_change(C))))
-
-
-def mended(found: IsometricSheet, C: Array, W: Array, weights: Array) -> Array:
-    """Coefficients C (F, 3, R) of bundled keyframes, those in doubt started again from others.
-
-    Args:
-        found: the sheet, its lengths by these shapes.
-        C: as above.
-        W: (F, 2, p) px; finite.
-        weights: (F, p) px⁻².
-    """
-    change, C = found.length_change(C), C.copy()
-    doubtful = change > DOUBTED * np.median(change)
-    others, images = found.in_frames(np.flatnonzero(~doubtful)), found.warps.images()
-    for k in np.flatnonzero(doubtful):
-        own = (C[k] @ found.functions.T)[None]
-        C[[k]] = best_of_starts(others, found.nodes.in_frames(np.array([k])), images[k], W[k], weights[k], own)
-    return C
-
-
-def described(
-    warps: Warps, nodes: Nodes, field: SmoothField, values: Array, c: Array, factor: Array, camera: Camera
-) -> IsometricSheet:
-    """The sheet of coefficients (F, r), with its lengths and how well they are kept."""
-    edges = edges_between(nodes, on_edges(nodes, field), camera).weighted(factor)
-    g = edges.log_lengths(c)
-    logs = mean_log_lengths(edges, g)
-    strain = edges.rms(g - logs)
-    median = float(np.median(strain))
-    return IsometricSheet(warps, nodes, field, values, c, logs, factor, strain, median, SOLVER.bend, camera)
 
 
 def first_depths(nodes: Nodes, seen: Edges, B: Array, stiffness: Array, camera: Camera) -> Array:

@@ -13,7 +13,7 @@ from scipy.linalg.lapack import dposv
 from reconstruction.arrays import Array
 from reconstruction.mapping.isometric.shape_prior import ShapePrior
 
-FUNCTIONS = 60
+FUNCTIONS, FINE_FUNCTIONS = 60, 100
 GIVE = 0.002  # of lengths: what they change by, noise apart
 
 

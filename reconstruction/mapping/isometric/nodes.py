@@ -10,8 +10,8 @@ from reconstruction.mapping.isometric.lengths import Edges, edges_of
 from reconstruction.mapping.isometric.smooth_field import SmoothField
 from reconstruction.mapping.isometric.warps import Warps
 
-NODES = 80
-NEIGHBOURS = 6
+NODES, NEIGHBOURS = 80, 6
+FINE_NODES, FINE_NEIGHBOURS = 120, 8
 USUAL_STRAIN = 0.01  # of lengths that are seen exactly
 
 
@@ -51,11 +51,11 @@ class Nodes:
         return replace(self, images=self.images[chosen], variance=self.variance[chosen], middles=self.middles[chosen])
 
 
-def nodes_of(warps: Warps) -> Nodes:
-    """Nodes of a sheet from its smooth images."""
-    points = warps.few[:NODES]
+def nodes_of(warps: Warps, *, fine: bool = False) -> Nodes:
+    """Nodes of a sheet from its smooth images; more of them, for fine bends."""
+    points = warps.few[: FINE_NODES if fine else NODES]
     images = warps.images(points)
-    ends = neighbours(images, NEIGHBOURS)
+    ends = neighbours(images, FINE_NEIGHBOURS if fine else NEIGHBOURS)
     middles = warps.images_at(warps.reference[:, points[ends]].mean(axis=2))
     return Nodes(points, warps.reference[:, points], images, warps.variance(points), ends, middles)
 

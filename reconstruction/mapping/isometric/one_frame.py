@@ -101,3 +101,21 @@ def cheapest(sheet: IsometricSheet, shapes: Array, W: Array, weights: Array) -> 
         C = sheet.bundled(shapes, seen[0], seen[1], sheet.prior)
         shapes = C @ sheet.functions.T
     return np.asarray(C[[sheet.cost(C, W, weights).argmin()]])
+
+
+def mended(found: IsometricSheet, C: Array, W: Array, weights: Array) -> Array:
+    """Coefficients C (F, 3, R) of bundled keyframes, those in doubt started again from others.
+
+    Args:
+        found: the sheet, its lengths by these shapes.
+        C: as above.
+        W: (F, 2, p) px; finite.
+        weights: (F, p) px⁻².
+    """
+    change, C = found.length_change(C), C.copy()
+    doubtful = change > DOUBTED * np.median(change)
+    others, images = found.in_frames(np.flatnonzero(~doubtful)), found.warps.images()
+    for k in np.flatnonzero(doubtful):
+        own = (C[k] @ found.functions.T)[None]
+        C[[k]] = best_of_starts(others, found.nodes.in_frames(np.array([k])), images[k], W[k], weights[k], own)
+    return C

@@ -8,13 +8,16 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices
 from reconstruction.camera import Camera
-from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, stepped
-from reconstruction.mapping.isometric.lengths import Edges
+from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS, FUNCTIONS, GIVE, Lengths, data_normal, stepped
+from reconstruction.mapping.isometric.lengths import Edges, mean_log_lengths
 from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, on_edges, rays_of
 from reconstruction.mapping.isometric.shape_prior import FIRM, ShapePrior, shape_prior
 from reconstruction.mapping.isometric.smooth_field import ENOUGH, SmoothField
 from reconstruction.mapping.isometric.warps import Warps
 
+# Lengths of a sheet change by less between its bundled shapes, which hold no noise. By more, they really do (a balloon, a
+# crease), and then no rest shape is right, or bends are finer than its functions.
+USUAL_STRETCH = 0.0042
 FARTHEST = 1.5  # times as deep as before, or less deep: a step that goes further has lost its way, and is not taken
 
 
@@ -33,6 +36,7 @@ class IsometricSheet:
         strain: (F,) change of length in each frame, weighted rms.
         usual_change: median of that; once keyframes are bundled, of their bundled shapes.
         bend: weight λ of bending that the depths were found with.
+        shape_functions: R, of the functions of the images, that bundled shapes are made of.
         camera: the camera.
     """
 
@@ -46,6 +50,7 @@ class IsometricSheet:
     strain: Array
     usual_change: float
     bend: float
+    shape_functions: int
     camera: Camera
 
     @property
@@ -74,9 +79,9 @@ class IsometricSheet:
         """(F, 3, p) in camera axes, of all points, also those not visible; NaN for points that no keyframe shows."""
         return self.along_rays(self.coefficients, self.warps.images())
 
-    def through(self, W: Array) -> Array:
-        """(F, 3, p) in camera axes as `shapes`, with the points where the keyframes W (F, 2, p) px saw them."""
-        return self.along_rays(self.coefficients, W)
+    def both(self, W: Array) -> tuple[Array, Array]:
+        """Its `shapes`, smooth, and the same with the points where the keyframes W (F, 2, p) px saw them."""
+        return self.shapes(), self.along_rays(self.coefficients, W)
 
     def along_rays(self, c: Array, images: Array) -> Array:
         """Shapes (F, 3, p) by coefficients (F, r) of log depths, along the rays of images (F or 1, 2, p) px."""
@@ -104,18 +109,18 @@ class IsometricSheet:
     @property
     def functions(self) -> Array:
         """(p, R) those that shapes are made of."""
-        return self.warps.values[:, :FUNCTIONS]
+        return self.warps.values[:, : self.shape_functions]
 
     @cached_property
     def lengths(self) -> Lengths:
         """Its edges."""
         first, second = self.functions[self.nodes.points[self.nodes.ends]].swapaxes(0, 1)
-        middle = self.at_middles[:, :FUNCTIONS]
+        middle = self.at_middles[:, : self.shape_functions]
         return Lengths(
             np.stack([middle - first, second - middle]),
             self.log_lengths,
             self.edge_weights,
-            self.warps.field.stiffness[:FUNCTIONS],
+            self.warps.field.stiffness[: self.shape_functions],
         )
 
     @cached_property
@@ -194,3 +199,24 @@ class IsometricSheet:
             coefficients=self.coefficients[chosen],
             strain=self.strain[chosen],
         )
+
+
+def described(
+    warps: Warps,
+    nodes: Nodes,
+    field: SmoothField,
+    values: Array,
+    c: Array,
+    factor: Array,
+    camera: Camera,
+    bend: float,
+    *,
+    fine: bool = False,
+) -> IsometricSheet:
+    """The sheet of coefficients (F, r), with its lengths and how well they are kept; weights of edges (n,) by a factor."""
+    edges = edges_between(nodes, on_edges(nodes, field), camera).weighted(factor)
+    g = edges.log_lengths(c)
+    logs = mean_log_lengths(edges, g)
+    strain, functions = edges.rms(g - logs), FINE_FUNCTIONS if fine else FUNCTIONS
+    usual = float(np.median(strain))
+    return IsometricSheet(warps, nodes, field, values, c, logs, factor, strain, usual, bend, functions, camera)

@@ -23,7 +23,7 @@ from reconstruction.mapping.outliers import without_outliers
 from reconstruction.principal import principal
 from reconstruction.window.robust import lengths
 
-FUNCTIONS = 100  # of the field that an image is made of
+FUNCTIONS, FINE_FUNCTIONS = 100, 150  # of the field that an image is made of
 NODES = 200
 FEW = 250  # well-spread points that are enough to tell gross errors
 FEWEST = 3  # of them that each image must show
@@ -69,6 +69,12 @@ class Warps:
     def images_at(self, places: Array) -> Array:
         """The same (F, 2, n) px of any places (2, n) of the reference image."""
         return np.asarray((self.field.at(places) @ self.coefficients).transpose(0, 2, 1))
+
+    def values_of(self, field: SmoothField) -> Array:
+        """(p, r) of other functions over the reference image at all points; NaN where a point has no place."""
+        values = np.full((len(self.placed), len(field.stiffness)), np.nan)
+        values[self.placed] = field.at(self.reference[:, self.placed])
+        return values
 
     @property
     def noise_over_size(self) -> float:
@@ -120,18 +126,27 @@ def smooth_warps(W: Array, visible: Mask) -> Warps:
     Raises:
         ReconstructionError: an image has hardly any points in common with the others.
     """
-    F, _, p = W.shape
     reference = reference_image(W, without_outliers(W, visible))  # one where few are seen would bend the map to it
     placed: Mask = np.isfinite(reference[0])
     few = np.flatnonzero(placed)[farthest_points(reference[:, placed].T, FEW)]
     if visible[:, few].sum(axis=1).min() < FEWEST:
         raise ReconstructionError(f"a keyframe shows fewer than {FEWEST} points that others show, too")
-    field = smooth_field(reference[:, few[:NODES]], FUNCTIONS)
-    values = np.zeros((p, len(field.stiffness)))
+    return on_reference(reference, few, placed, FUNCTIONS, W, visible)
+
+
+def finer(warps: Warps, W: Array, visible: Mask) -> Warps:
+    """The same images made smooth by more functions."""
+    return on_reference(warps.reference, warps.few, warps.placed, FINE_FUNCTIONS, W, visible)
+
+
+def on_reference(reference: Array, few: Indices, placed: Mask, functions: int, W: Array, visible: Mask) -> Warps:
+    """Smooth images of W (F, 2, p) px, by visibility (F, p), of so many functions; the others as in `Warps`."""
+    field = smooth_field(reference[:, few[:NODES]], functions)
+    values = np.zeros((W.shape[2], len(field.stiffness)))
     values[placed] = field.at(reference[:, placed])
-    nothing = np.zeros((F, p))
+    nothing = np.zeros((len(W), W.shape[2]))
     empty = Warps(
-        field, reference, values, few, placed, np.zeros((F, 0, 2)), nothing, nothing > 0, np.ones(F), FIRST_FIRMNESS
+        field, reference, values, few, placed, nothing[:, :0, None], nothing, nothing > 0, np.ones(len(W)), FIRST_FIRMNESS
     )
     return fitted(empty, W, visible, found_firmness(empty, W, visible))
 
