@@ -40,7 +40,8 @@ OFTEN = 0.8  # of the keyframes in which a point to compare is seen
 SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
 LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
 SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave so many times less than anything rigid, ...
-STRETCH_FREEDOM = 150.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane
+STRETCH_FREEDOM = 150.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane,
+MOST_FREEDOM = 3.5  # ... no more: cloth in the wind leaves a fifth of what anything rigid does, what deforms a half
 # A solid that turns less is not proven, unless its relief explains so many times what neighbours share of what it leaves
 # over, in squares: what deforms seems to turn, too.
 HARDLY_TURNED, EXPLAINED = 25.0, 5.0
@@ -151,7 +152,7 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     """The kind, and how many times more the next best leaves.
 
     Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges, if they are proven. Cloth
-    stretches, and its waves are no relief that lasts; a face that talks passes for a sheet that stretches, but has one.
+    stretches, its waves are no relief that lasts; a face that talks passes for a sheet that stretches, but has one.
 
     Args:
         rigid: what rigid shapes leave over.
@@ -166,7 +167,7 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     if not rigid.proven:  # all of its stretching speaks against a sheet, too
         rigid_px, least, explained = min(flat.whole_px, solid.whole_px), 1.0, 1.0
     better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
-    freedom = least + STRETCH_FREEDOM * stretch * explained
+    freedom = min(least + STRETCH_FREEDOM * stretch * explained, MOST_FREEDOM)
     if freedom * better < 1:
         return "sheet", float(1 / (freedom * better))
     return best, float(min(max(gain, 1 / gain), least * better))

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking import Array, Flags, Floats, Image
 from tracking.consistency import spacing_px
-from tracking.region.groups import groups_of
+from tracking.region.groups import FAR, FEWEST, connected, delaunay_edges, groups_of
 
 STILL_PX = 2.0  # a group that moves less does not move
 BESIDE = 8  # points of the surface that say where a point beside them should go
@@ -18,6 +18,7 @@ REACH = 1.0  # times the usual distance between points on it, that the surface g
 GAP = 2.0  # the same: narrower gaps between its parts are its own
 FAR_ENOUGH = 0.05  # of the picture's larger side: what has moved so far in a region that was drawn has moved
 HOLE = 15  # points of something else in a hole of the surface: with fewer, it is none
+LEFT = 30  # points beside each other that leave what is behind are enough to say where the surface is
 OTHER_SHARE = 0.1  # of the best group's score: less, and a group is not worth a word
 
 
@@ -59,7 +60,31 @@ def surfaces(W: Array, region: Image) -> list[Surface]:
     way = found.motion_px if region.all() else found.motion_px.clip(max=FAR_ENOUGH * side)
     score = np.where(found.motion_px > STILL_PX, size * way, 0.0)
     order = [int(k) for k in np.argsort(-score, kind="stable") if score[k] > OTHER_SHARE * score.max()]
+    if not order and len(found.motion_px):
+        loose = left_by(W, found.label == 0, side)
+        return [surface_of(W, loose, loose | (found.label == 0), region)] if loose.any() else []
     return [surface_of(W, found.label == k, found.label >= 0, region) for k in order]
+
+
+def left_by(W: Array, still: Flags, side: int) -> Flags:
+    """Most points (P,) beside each other that do not go where a group (P,) would carry them, or none.
+
+    Where hardly anything but what is behind has a group, what goes its own way is the surface: small, or lost again and
+    again. In the first frames that tell: later it covers points that were behind, and takes them along.
+    """
+    edges = delaunay_edges(W[0])
+    edges = edges[np.linalg.norm(W[0][edges[:, 0]] - W[0][edges[:, 1]], axis=1) < FAR * side]
+    own = np.zeros_like(still)
+    for frames in range(2, len(W) + 1):
+        off, _, way = astray_px(W[:frames], still)
+        loose = ~still & (off > STRAY_PX) & (way > STILL_PX)
+        part = np.where(loose, connected(edges[loose[edges].all(axis=1)], len(loose)), -1)
+        size = np.bincount(part[loose], minlength=1)
+        if size.max() >= max(FEWEST, own.sum() + 1):
+            own = np.asarray(part == size.argmax())
+        if own.sum() >= LEFT:
+            break
+    return own
 
 
 def middling(place: Array, region: Image) -> Array:
