@@ -13,7 +13,7 @@ from reconstruction.basis.mesh import Mesh, ratio_of_sizes
 from reconstruction.basis.model import Model, build_model
 from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, medoid
 from reconstruction.camera import Camera, lens, nearest_rotation
-from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, by_part, refined, sheet
+from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, in_parts, refined, sheet
 from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
@@ -166,18 +166,17 @@ def map_of(
         return None
     try:
         seen_by = camera if camera.perspective else lens(W, LONG_LENS)
-        whole = cache(lambda: sheet(W, visible, seen_by))
-        evidence = select(
-            W,
-            visible,
-            camera,
-            lambda parts: ([by_part(whole(), part).both(W[part]) for part in parts], whole().strain_beyond_noise),
-            start,
-        )
+        whole, patient = cache(lambda: sheet(W, visible, seen_by)), last is not None
+        evidence = select(W, visible, camera, lambda parts: in_parts(whole(), W, parts), start)
+        if (
+            patient and evidence.sureness < 1
+        ):  # but for how a sheet stretches it would be one: it may have bends that were cut off
+            fine = cache(lambda: refined(whole(), W, visible))
+            evidence = select(W, visible, camera, lambda parts: in_parts(fine(), W, parts), start)
         made = kind or evidence.kind
         if made == "flat" or (given is not None and made != "sheet"):
             return None
-        by, patient = (W, visible), last is not None
+        by = W, visible
         if made == "sheet":
             found = sheet_map(
                 W, visible, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=patient

@@ -12,6 +12,7 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
+from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS as SHAPE_FUNCTIONS
 from reconstruction.mapping.isometric.bundle import places_moved
 from reconstruction.mapping.isometric.convex import convex_finish, convex_start
 from reconstruction.mapping.isometric.lengths import (
@@ -104,7 +105,13 @@ def by_part(found: IsometricSheet, part: Indices) -> IsometricSheet:
     edges = found.edges_in(nodes)
     c = adjust_depths(edges, found.coefficients[part], found.field.stiffness, SOLVER)
     warps = found.warps.in_frames(part)
-    return described(warps, nodes, found.field, found.values, c, found.edge_weights, found.camera, found.bend)
+    functions, factor = found.shape_functions, found.edge_weights
+    return described(warps, nodes, found.field, found.values, c, factor, found.camera, found.bend, functions)
+
+
+def in_parts(found: IsometricSheet, W: Array, parts: list[Indices]) -> tuple[list[tuple[Array, Array]], float]:
+    """Shapes of the sheet for each of several parts of its keyframes W (F, 2, p) px, as model selection asks for them."""
+    return [by_part(found, part).both(W[part]) for part in parts], found.strain_beyond_noise
 
 
 def refined(found: IsometricSheet, W: Array, visible: Mask) -> IsometricSheet:
@@ -123,7 +130,7 @@ def refined(found: IsometricSheet, W: Array, visible: Mask) -> IsometricSheet:
     c = found.coefficients @ found.values[nodes.points].T @ np.linalg.pinv(B).T
     c, factor = once_more(seen, seen, c, field.stiffness)
     c, factor = again(nodes, seen, seen.weighted(factor), c, B, field.stiffness, found.camera)
-    return described(warps, nodes, field, values, c, factor, found.camera, found.bend, fine=True)
+    return described(warps, nodes, field, values, c, factor, found.camera, found.bend, SHAPE_FUNCTIONS)
 
 
 def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:

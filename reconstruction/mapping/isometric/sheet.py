@@ -8,7 +8,7 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices
 from reconstruction.camera import Camera
-from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS, FUNCTIONS, GIVE, Lengths, data_normal, stepped
+from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, stepped
 from reconstruction.mapping.isometric.lengths import Edges, mean_log_lengths
 from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, on_edges, rays_of
 from reconstruction.mapping.isometric.shape_prior import FIRM, ShapePrior, shape_prior
@@ -210,13 +210,12 @@ def described(
     factor: Array,
     camera: Camera,
     bend: float,
-    *,
-    fine: bool = False,
+    shape_functions: int = FUNCTIONS,
 ) -> IsometricSheet:
     """The sheet of coefficients (F, r), with its lengths and how well they are kept; weights of edges (n,) by a factor."""
     edges = edges_between(nodes, on_edges(nodes, field), camera).weighted(factor)
     g = edges.log_lengths(c)
     logs = mean_log_lengths(edges, g)
-    strain, functions = edges.rms(g - logs), FINE_FUNCTIONS if fine else FUNCTIONS
+    strain = edges.rms(g - logs)
     usual = float(np.median(strain))
-    return IsometricSheet(warps, nodes, field, values, c, logs, factor, strain, usual, bend, functions, camera)
+    return IsometricSheet(warps, nodes, field, values, c, logs, factor, strain, usual, bend, shape_functions, camera)
