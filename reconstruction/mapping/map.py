@@ -168,9 +168,7 @@ def map_of(
         seen_by = camera if camera.perspective else lens(W, LONG_LENS)
         whole, patient = cache(lambda: sheet(W, visible, seen_by)), last is not None
         evidence = select(W, visible, camera, lambda parts: in_parts(whole(), W, parts), start)
-        if (
-            patient and evidence.sureness < 1
-        ):  # but for how a sheet stretches it would be one: it may have bends that were cut off
+        if patient and camera.perspective and evidence.sureness < 1:  # but for its stretch a sheet: bends may be cut off
             fine = cache(lambda: refined(whole(), W, visible))
             evidence = select(W, visible, camera, lambda parts: in_parts(fine(), W, parts), start)
         made = kind or evidence.kind
