@@ -27,9 +27,6 @@ from reconstruction.state import State
 
 FEWEST_KEYFRAMES, FEWEST_POINTS = 6, 20
 LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
-COARSE = (
-    0.0028  # change of lengths between a sheet's bundled shapes: more, and their functions are too coarse for its bends
-)
 ASSUMED = "focal length {:.0f} px assumed: give it if you know better"
 
 

@@ -152,7 +152,7 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     """The kind, and how many times more the next best leaves.
 
     Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges, if they are proven. Cloth
-    stretches, its waves are no relief that lasts; a face that talks passes for a sheet that stretches, but has one.
+    stretches, and its waves are no relief that lasts; a face that talks passes for a sheet that stretches, but has one.
 
     Args:
         rigid: what rigid shapes leave over.

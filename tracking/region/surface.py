@@ -60,7 +60,7 @@ def surfaces(W: Array, region: Image) -> list[Surface]:
     way = found.motion_px if region.all() else found.motion_px.clip(max=FAR_ENOUGH * side)
     score = np.where(found.motion_px > STILL_PX, size * way, 0.0)
     order = [int(k) for k in np.argsort(-score, kind="stable") if score[k] > OTHER_SHARE * score.max()]
-    if not order and len(found.motion_px):
+    if not order and len(found.motion_px) and region.all():  # one that was drawn may be all the surface
         loose = left_by(W, found.label == 0, side)
         return [surface_of(W, loose, loose | (found.label == 0), region)] if loose.any() else []
     return [surface_of(W, found.label == k, found.label >= 0, region) for k in order]

@@ -12,7 +12,7 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
-from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS as SHAPE_FUNCTIONS
+from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS as FINE_SHAPES
 from reconstruction.mapping.isometric.bundle import places_moved
 from reconstruction.mapping.isometric.convex import convex_finish, convex_start
 from reconstruction.mapping.isometric.lengths import (
@@ -130,7 +130,7 @@ def refined(found: IsometricSheet, W: Array, visible: Mask) -> IsometricSheet:
     c = found.coefficients @ found.values[nodes.points].T @ np.linalg.pinv(B).T
     c, factor = once_more(seen, seen, c, field.stiffness)
     c, factor = again(nodes, seen, seen.weighted(factor), c, B, field.stiffness, found.camera)
-    return described(warps, nodes, field, values, c, factor, found.camera, found.bend, SHAPE_FUNCTIONS)
+    return described(warps, nodes, field, values, c, factor, found.camera, found.bend, FINE_SHAPES)
 
 
 def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:
