@@ -167,8 +167,7 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     if not rigid.proven:  # all of its stretching speaks against a sheet, too
         rigid_px, least, explained = min(flat.whole_px, solid.whole_px), 1.0, 1.0
     better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
-    freedom = min(least + STRETCH_FREEDOM * stretch * explained, MOST_FREEDOM)
-    if freedom * better < 1:
+    if (freedom := min(least + STRETCH_FREEDOM * stretch * explained, MOST_FREEDOM)) * better < 1:
         return "sheet", float(1 / (freedom * better))
     return best, float(min(max(gain, 1 / gain), least * better))
 
