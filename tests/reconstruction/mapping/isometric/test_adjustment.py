@@ -163,7 +163,7 @@ def test_what_is_seen_through_is_no_sheet_but_noise_may_be_as_large() -> None:
 def test_what_stretches_is_no_sheet() -> None:
     rng = np.random.default_rng(7)
     W, _ = waving_sheet(rng, frames=15)
-    W = W + 6 * np.sin(W[:, ::-1] / 20 + rng.uniform(0, 6, (15, 1, 1)))
+    W = W + 12 * np.sin(W[:, ::-1] / 20 + rng.uniform(0, 6, (15, 1, 1)))
     with pytest.raises(ReconstructionError, match="lengths change"):
         sheet(W, np.ones((15, 150), bool), CAMERA)
 
