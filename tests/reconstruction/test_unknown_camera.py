@@ -19,7 +19,7 @@ def solid_seen(camera: Camera) -> np.ndarray:
     return W + 0.1 * rng.normal(size=W.shape)
 
 
-@pytest.mark.parametrize("unit", [1.0, 1e-3])
+@pytest.mark.parametrize("unit", [1.0, pytest.param(1e-3, marks=pytest.mark.whole)])
 def test_of_a_solid(unit: float) -> None:
     everything = np.ones((FRAMES, POINTS), bool)
     assert not likely_camera(unit * solid_seen(ORTHOGRAPHIC), everything).perspective

@@ -144,10 +144,8 @@ def on_reference(reference: Array, few: Indices, placed: Mask, functions: int, W
     field = smooth_field(reference[:, few[:NODES]], functions)
     values = np.zeros((W.shape[2], len(field.stiffness)))
     values[placed] = field.at(reference[:, placed])
-    nothing = np.zeros((len(W), W.shape[2]))
-    empty = Warps(
-        field, reference, values, few, placed, nothing[:, :0, None], nothing, nothing > 0, np.ones(len(W)), FIRST_FIRMNESS
-    )
+    none, nothing, noise = np.zeros((len(W), 0, 2)), np.zeros((len(W), W.shape[2])), np.ones(len(W))
+    empty = Warps(field, reference, values, few, placed, none, nothing, nothing > 0, noise, FIRST_FIRMNESS)
     return fitted(empty, W, visible, found_firmness(empty, W, visible))
 
 
