@@ -10,7 +10,7 @@ from tempfile import TemporaryFile
 from app.environment import environment
 from app.memory import keep_memory
 
-NICE = 5  # of processes that frames do not wait for
+NICE, NICEST = 5, 19  # of processes that frames do not wait for; the nicest takes what all others leave
 
 
 def child(module: str, *files: int) -> tuple["subprocess.Popen[bytes]", Connection]:

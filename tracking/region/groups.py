@@ -63,8 +63,7 @@ def groups_of(W: Array, extent_px: float) -> Groups:
     W = W[:, often]
     moved = W - W[0]
     way = farthest(moved)
-    edges = delaunay_edges(W[0])
-    edges = edges[np.linalg.norm(W[0][edges[:, 0]] - W[0][edges[:, 1]], axis=1) < FAR * extent_px]
+    edges = edges_beside(W[0], extent_px)
     by_end, apart = tear_px(W[0], moved, edges)
     tear = by_end.min(axis=0)
     torn = max(TORN_PX, float(np.median(tear)))  # in blurred pictures points go this way and that
@@ -127,6 +126,12 @@ def local_slope(place: Array, moved: Array) -> Array:
         gram = (w[..., None, :] @ products).reshape(slope.shape) + pull
         slope = (w[..., None] * gain).swapaxes(2, 3) @ apart @ np.linalg.inv(gram)
     return np.asarray(slope)
+
+
+def edges_beside(place: Array, extent_px: float) -> Indices:
+    """Edges (n, 2) of the Delaunay mesh of points (P, 2), short enough to join them in a picture of that larger side."""
+    edges = delaunay_edges(place)
+    return edges[np.linalg.norm(place[edges[:, 0]] - place[edges[:, 1]], axis=1) < FAR * extent_px]
 
 
 def delaunay_edges(place: Array) -> Indices:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking import Array, Flags, Floats, Image
 from tracking.consistency import spacing_px
-from tracking.region.groups import FAR, FEWEST, connected, delaunay_edges, groups_of
+from tracking.region.groups import FEWEST, connected, edges_beside, groups_of
 
 STILL_PX = 2.0  # a group that moves less does not move
 BESIDE = 8  # points of the surface that say where a point beside them should go
@@ -72,8 +72,7 @@ def left_by(W: Array, still: Flags, side: int) -> Flags:
     Where hardly anything but what is behind has a group, what goes its own way is the surface: small, or lost again and
     again. In the first frames that tell: later it covers points that were behind, and takes them along.
     """
-    edges = delaunay_edges(W[0])
-    edges = edges[np.linalg.norm(W[0][edges[:, 0]] - W[0][edges[:, 1]], axis=1) < FAR * side]
+    edges = edges_beside(W[0], side)
     own = np.zeros_like(still)
     for frames in range(2, len(W) + 1):
         off, _, way = astray_px(W[:frames], still)

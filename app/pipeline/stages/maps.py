@@ -5,10 +5,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from types import TracebackType
 from typing import Any, Self
 
-from app.processes.child import connection_to_parent
+from app.processes.child import NICEST, connection_to_parent
 from app.processes.remote import Remote, packed, serve
-
-NICE = 19  # of the process: it takes what all others leave
 
 
 class MapProcess:
@@ -37,7 +35,7 @@ class MapProcess:
 
 def main() -> None:
     """What the other process does, until nobody listens any more."""
-    connection = connection_to_parent(nice=NICE)
+    connection = connection_to_parent(nice=NICEST)
     import reconstruction.mapping.mapper  # noqa: F401 (takes its time: before the first call)
 
     serve(connection, lambda message: message[0](*message[1]))

@@ -11,7 +11,6 @@ from reconstruction.basis.model import build_model
 from reconstruction.basis.rest_shape import completed, given, medoid
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
-from reconstruction.mapping import map as maps
 from reconstruction.mapping.map import Map, map_of
 from reconstruction.online import Reconstruction
 from reconstruction.settings import Settings
@@ -48,19 +47,6 @@ def test_a_sheet_that_is_never_flat() -> None:
     posed = s[:, None, None] * R @ found.rest.motion.shape
     image = (posed[:, :2] + t[:, :, None]) / (1 + posed[:, 2:] / CAMERA.focal_px) + CAMERA.center_px[:, None]
     assert np.median(np.abs(image - W[::2])) < 0.05 * np.ptp(W)
-
-
-def test_bends_that_the_usual_functions_cut_off_are_followed_by_finer_ones(monkeypatch: pytest.MonkeyPatch) -> None:
-    W, S = waving_sheet(np.random.default_rng(5), FRAMES, amplitude=0.9, points=POINTS)
-    every = np.ones((FRAMES, POINTS), bool)
-    errors = []
-    for most in (np.inf, maps.USUAL_STRETCH):
-        monkeypatch.setattr(maps, "USUAL_STRETCH", most)
-        found = map_of(W, every, CAMERA, estimate_focal=False, last=lambda: (W, every))
-        assert found is not None
-        assert found.sheet is not None
-        errors.append(e3d(found.sheet.shapes(), S).mean())
-    assert errors[1] < 0.8 * errors[0]
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
