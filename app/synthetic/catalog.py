@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from app.arrays import Array
-from app.synthetic import sheet, solid
+from app.synthetic import cloth, sheet, solid
 from app.synthetic.path import Path
 
 Shape = Callable[[Array, float], Array]  # of places (n, 2) and a time from 0 to 1: points (n, 3)
@@ -74,6 +74,21 @@ def swaying(rng: np.random.Generator) -> Shape:
         return np.asarray((level + below * (folds - level)) @ turned.T)
 
     return shape
+
+
+def flapping(rng: np.random.Generator) -> Shape:
+    """A flag on a pole at its left, in a wind that turns."""
+    pole = np.zeros((cloth.ROWS, cloth.COLUMNS), bool)
+    pole[:, 0] = True
+    return cloth.filmed(pole, lambda _: np.zeros(3), cloth.gusts(rng, (8.0, -1.0, 0.0), (1.5, 0.8, 1.2)))
+
+
+def shaken(rng: np.random.Generator) -> Shape:
+    """A cloth held by its upper corners and shaken, in a draught."""
+    corners = np.zeros((cloth.ROWS, cloth.COLUMNS), bool)
+    corners[0, [0, -1]] = True
+    hand = cloth.gusts(rng, (0.0, 0.0, 0.0), (0.02, 0.02, 0.05))
+    return cloth.filmed(corners, hand, cloth.gusts(rng, (0.0, 0.0, 0.5), (0.5, 0.3, 0.8)))
 
 
 def rolling(rng: np.random.Generator) -> Shape:
@@ -159,6 +174,8 @@ KINDS = {
     "waving-9": Kind("sheet", waving(0.9), SHEET_TURN),
     "rolling": Kind("sheet", rolling, SHEET_TURN),
     "curtain": Kind("sheet", swaying, (0.5, 1.0)),
+    "cloth": Kind("sheet", shaken, SHEET_TURN),
+    "flag": Kind("sheet", flapping, SHEET_TURN),
     "cone": Kind("sheet", coning, SHEET_TURN, held_back=True),
     "crease": Kind("sheet", creasing, SHEET_TURN, held_back=True),
     "card": Kind("flat", still(flat), SOLID_TURN),

@@ -9,6 +9,7 @@ import numpy as np
 from tracking import Array, Flags, Image, TrackingError
 from tracking.features import detect_corners
 from tracking.flow import CONVERGED_PX, FEW_GUIDES, Grays, levels_of, lucas_kanade, returned
+from tracking.region.background import by_first_camera
 from tracking.region.border import at_colours
 from tracking.region.groups import TENTH
 from tracking.region.surface import FAR_ENOUGH, Surface, middling, surfaces
@@ -106,7 +107,8 @@ class Search:
             if good.sum() < SEEN * len(last) or self._contrast_now() > CLEARER * self._contrast:
                 return False
         self._tracks.append(moved)
-        self._way = np.fmax(self._way, np.linalg.norm(moved - self._tracks[0], axis=1))
+        first, now = still([self._tracks[0], moved], self._region)
+        self._way = np.fmax(self._way, np.linalg.norm(now - first, axis=1))
         return True
 
     def found(self) -> tuple[Image, list[Surface]]:
@@ -130,6 +132,11 @@ class Search:
         return float(self._grays.half[self._region[::2, ::2] > 0].std())
 
 
+def still(tracks: list[Array], region: Image) -> list[Array]:
+    """Tracks (P, 2) each as a camera that does not move sees them; as they are in a region (H, W) that somebody chose."""
+    return by_first_camera(tracks, (region.shape[1], region.shape[0])) if region.all() else tracks
+
+
 def compared(tracks: list[Array]) -> Array:
     """Tracks (F, P, 2) in frames well spread, most of them early: what is soon covered shows only there how it goes."""
     chosen = np.unique(((len(tracks) - 1) * np.linspace(0, 1, COMPARED) ** 2).round().astype(int))
@@ -146,7 +153,7 @@ def found(tracks: list[Array], region: Image, image_bgr: Image) -> tuple[Image, 
         region: (H, W) uint8.
         image_bgr: (H, W, 3) uint8, that picture.
     """
-    moving = surfaces(compared(tracks), region)
+    moving = surfaces(compared(still(tracks, region)), region)
     if moving:
         best = moving[0]
         left_out = ~best.own if region.all() else best.other  # nobody has chosen a picture's corners
