@@ -110,7 +110,9 @@ def pairs(X: Array, flat: Array, free: Flags) -> Iterator[Springs]:
     weight = free[..., None].astype(np.float64)
     for down, right, strength in NEIGHBOURS:
         rows = slice(None, -down or None), slice(down, None)
-        columns = (slice(None, -right or None), slice(right, None)) if right >= 0 else (slice(-right, None), slice(None, right))
+        columns = (
+            (slice(None, -right or None), slice(right, None)) if right >= 0 else (slice(-right, None), slice(None, right))
+        )
         axis, reach = (0, down) if down else (1, right)
         for phase in range(2 * reach):
             every = tuple(slice(phase, None, 2 * reach) if k == axis else slice(None) for k in range(2))

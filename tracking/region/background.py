@@ -8,50 +8,63 @@ import numpy as np
 from tracking import Array, Flags
 
 BAND = 0.15  # of the picture's sides: points so near to its border are of what is behind
-FEWEST = 8  # of them at a side that tells
-SIDES = 3  # that must tell the same: a head hides one
+SECTORS, AGREEING = 8, 5  # of the picture's border, and how many must tell the same: head and shoulders hide three
+FEWEST = 4  # points of one that tells
 OFF_PX = 2.0  # from where the camera's motion takes them, points are not of it
-AGREED = 0.6  # of the points at the border must be of it, and half of those at a side
+AGREED = 0.75  # of the points at the border must be of it, and half of those in a sector: of a sheet that bends fewer are
 STILL_PX = 2.0  # a camera by which the border moves less stands still
 
 
-def by_first_camera(tracks: Sequence[Array], size: tuple[int, int]) -> list[Array]:
+def by_first_camera(tracks: Sequence[Array], size: tuple[int, int]) -> tuple[list[Array], float]:
     """Tracks (P, 2) px each as the camera of the first would have seen them, were all of it as far as what is behind.
 
-    As they are where the border does not move, or not as one.
+    As they are where the border does not move, or not as one in all frames: then what is there may bend.
 
     Args:
         tracks: NaN where not seen.
         size: width and height of the picture.
+
+    Returns:
+        The tracks; how far the camera's motion took its border in the frame where it was farthest, px.
     """
-    sides = at_sides(tracks[0], size)
-    return [undone(tracks[0], now, sides) for now in tracks]
+    sectors = at_border(tracks[0], np.array(size))
+    motions = [motion(tracks[0], now, sectors) for now in tracks[1:]]
+    known = [one for one in motions if one is not None]
+    moved_px = max((px for _, px in known), default=0.0)
+    if len(known) < len(motions) or moved_px < STILL_PX:
+        return list(tracks), 0.0
+    return [tracks[0], *(undone(now, H) for now, (H, _) in zip(tracks[1:], known, strict=True))], moved_px
 
 
-def at_sides(points: Array, size: tuple[int, int]) -> Flags:
-    """Which points (P, 2) px are near the left, upper, right and lower border, (4, P)."""
-    extent = np.array(size)
-    near = np.stack([points, extent - 1 - points]) < BAND * extent
-    return np.asarray(near.transpose(0, 2, 1).reshape(4, -1))
+def at_border(points: Array, size: Array) -> Flags:
+    """Which points (P, 2) px are near the border of a picture, by the direction from its middle: (SECTORS, P)."""
+    off = (points + 0.5) / size - 0.5
+    direction = np.floor(np.arctan2(off[:, 1], off[:, 0]) / (2 * np.pi) * SECTORS + 0.5).astype(int) % SECTORS
+    near = np.abs(off).max(axis=1) > 0.5 - BAND
+    return near & (direction == np.arange(SECTORS)[:, None])
 
 
-def undone(first: Array, now: Array, sides: Flags) -> Array:
-    """Points now (P, 2) px without the camera's motion since they were at first (P, 2)."""
-    seen = np.isfinite(now[:, 0])
-    told = sides & seen
-    band = told.any(axis=0)
-    if (told.sum(axis=1) >= FEWEST).sum() < SIDES:
-        return now
+def motion(first: Array, now: Array, sectors: Flags) -> tuple[Array, float] | None:
+    """The camera's motion between points at first and now (P, 2) px: a homography (3, 3) back, and how far it took them.
+
+    None where the border does not tell.
+    """
+    told = sectors & np.isfinite(now[:, 0])
+    band, count = told.any(axis=0), told.sum(axis=1)
+    if (count >= FEWEST).sum() < AGREEING:
+        return None
     H, inlier = cv2.findHomography(now[band], first[band], cv2.RANSAC, OFF_PX)
-    if H is None:
-        return now
-    agrees = np.zeros(len(first), np.bool_)
-    agrees[band] = inlier[:, 0] > 0
-    by_side = (told & agrees).sum(axis=1) >= np.maximum(0.5 * told.sum(axis=1), FEWEST)
-    if by_side.sum() < SIDES or agrees.sum() < AGREED * band.sum():
-        return now
-    if np.median(np.linalg.norm(now - first, axis=1)[agrees]) < STILL_PX:
-        return now
-    back = np.full_like(now, np.nan)
+    if H is None or inlier.mean() < AGREED:
+        return None
+    of_it = np.zeros(len(first), np.bool_)
+    of_it[band] = inlier[:, 0] > 0
+    if ((told & of_it).sum(axis=1) >= np.maximum(0.5 * count, FEWEST)).sum() < AGREEING:
+        return None
+    return np.asarray(H), float(np.median(np.linalg.norm(now - first, axis=1)[of_it]))
+
+
+def undone(now: Array, H: Array) -> Array:
+    """Points (P, 2) px, NaN where not seen, that a homography (3, 3) takes back."""
+    back, seen = np.full_like(now, np.nan), np.isfinite(now[:, 0])
     back[seen] = cv2.perspectiveTransform(now[seen][None], H)[0]
     return back

@@ -12,13 +12,14 @@ from tracking.flow import CONVERGED_PX, FEW_GUIDES, Grays, levels_of, lucas_kana
 from tracking.region.background import by_first_camera
 from tracking.region.border import at_colours
 from tracking.region.groups import TENTH
-from tracking.region.surface import FAR_ENOUGH, Surface, middling, surfaces
+from tracking.region.surface import FAR_ENOUGH, STILL_PX, Surface, middling, surfaces
 from tracking.video import Frame
 
 MOST_FRAMES = 90  # are looked at
 MIDDLE = 0.5  # of a region that was drawn: nearer to its middle than to its border
 SEEN = 0.5  # of the points: fewer left say nothing of the others, or it is another picture
 CLEARER = 2.0  # times the contrast of the first frame: it was still fading in
+PARALLAX = 0.15  # of how far the camera's motion takes what is behind, things nearer by may go otherwise, and be still
 COMPARED = 20  # of those frames that are compared
 WINDOW_PX = 15
 WIDE_PX = 31  # leads points that do not come back: fast ones. It sees across borders, so the other has the last word
@@ -107,7 +108,7 @@ class Search:
             if good.sum() < SEEN * len(last) or self._contrast_now() > CLEARER * self._contrast:
                 return False
         self._tracks.append(moved)
-        first, now = still([self._tracks[0], moved], self._region)
+        (first, now), _ = still([self._tracks[0], moved], self._region)
         self._way = np.fmax(self._way, np.linalg.norm(now - first, axis=1))
         return True
 
@@ -132,9 +133,9 @@ class Search:
         return float(self._grays.half[self._region[::2, ::2] > 0].std())
 
 
-def still(tracks: list[Array], region: Image) -> list[Array]:
-    """Tracks (P, 2) each as a camera that does not move sees them; as they are in a region (H, W) that somebody chose."""
-    return by_first_camera(tracks, (region.shape[1], region.shape[0])) if region.all() else tracks
+def still(tracks: list[Array], region: Image) -> tuple[list[Array], float]:
+    """As `by_first_camera`; tracks (P, 2) as they are in a region (H, W) that somebody chose, which may be all surface."""
+    return by_first_camera(tracks, (region.shape[1], region.shape[0])) if region.all() else (tracks, 0.0)
 
 
 def compared(tracks: list[Array]) -> Array:
@@ -153,7 +154,8 @@ def found(tracks: list[Array], region: Image, image_bgr: Image) -> tuple[Image, 
         region: (H, W) uint8.
         image_bgr: (H, W, 3) uint8, that picture.
     """
-    moving = surfaces(compared(still(tracks, region)), region)
+    W, camera_px = still(tracks, region)
+    moving = surfaces(compared(W), region, max(STILL_PX, PARALLAX * camera_px))
     if moving:
         best = moving[0]
         left_out = ~best.own if region.all() else best.other  # nobody has chosen a picture's corners

@@ -6,13 +6,14 @@ from typing import cast
 import cv2
 import numpy as np
 
-from tracking import Array, Flags, Floats, Image
+from tracking import Array, Flags, Floats, Image, Indices
 from tracking.consistency import spacing_px
 from tracking.region.groups import FEWEST, connected, edges_beside, groups_of
 
-STILL_PX = 2.0  # a group that moves less does not move
+STILL_PX = 2.0  # a group that moves less does not move, before a camera that does not
 BESIDE = 8  # points of the surface that say where a point beside them should go
 STRAY_PX = 3.0  # a point no farther from where the surface would carry it is not of something else, and ...
+FOLLOWS = 0.25  # of the way that those beside it go, a point that goes with them may be off
 SHARED = 0.5  # ... one that goes so much of its way: a lip or a chin goes farther, what is behind stays
 REACH = 1.0  # times the usual distance between points on it, that the surface goes on beyond them
 GAP = 2.0  # the same: narrower gaps between its parts are its own
@@ -45,7 +46,7 @@ class Surface:
         return int(x), int(y), int(w), int(h)
 
 
-def surfaces(W: Array, region: Image) -> list[Surface]:
+def surfaces(W: Array, region: Image, still_px: float = STILL_PX) -> list[Surface]:
     """What moves in a region, the one with most points times motion first, those not worth a word left out.
 
     A region that was drawn was drawn around the surface: points in its middle count most, those on its border nothing.
@@ -53,17 +54,27 @@ def surfaces(W: Array, region: Image) -> list[Surface]:
     Args:
         W: (F, P, 2) px, tracks of points of the region; NaN where not seen.
         region: (H, W) uint8, 255 inside.
+        still_px: what moves less does not move.
     """
     found, side = groups_of(W, float(max(region.shape))), max(region.shape)
     weight = middling(W[0], region)[found.label >= 0]
     size = np.bincount(found.label[found.label >= 0], weight, len(found.motion_px))
     way = found.motion_px if region.all() else found.motion_px.clip(max=FAR_ENOUGH * side)
-    score = np.where(found.motion_px > STILL_PX, size * way, 0.0)
+    score = np.where(found.motion_px > still_px, size * way, 0.0)
     order = [int(k) for k in np.argsort(-score, kind="stable") if score[k] > OTHER_SHARE * score.max()]
-    if not order and len(found.motion_px) and region.all():  # one that was drawn may be all the surface
-        loose = left_by(W, found.label == 0, side)
-        return [surface_of(W, loose, loose | (found.label == 0), region)] if loose.any() else []
-    return [surface_of(W, found.label == k, found.label >= 0, region) for k in order]
+    groups = [found.label == k for k in order]
+    still = np.isin(found.label, np.flatnonzero(found.motion_px <= still_px))
+    if still.any() and region.all():  # one that was drawn may be all the surface
+        loose = left_by(W, still, side)
+        if loose.any() and (not groups or whole(loose, groups[0])):
+            groups = [loose, *(group for group in groups if not (group & loose).any())]
+            return [surface_of(W, group, np.any([still, *groups], axis=0), region) for group in groups]
+    return [surface_of(W, group, found.label >= 0, region) for group in groups]
+
+
+def whole(loose: Flags, group: Flags) -> bool:
+    """Whether a group (P,) is a small part of what leaves what is behind (P,), not a small thing beside it."""
+    return bool((group & loose).sum() > 0.5 * group.sum() and group.sum() < 0.5 * loose.sum())
 
 
 def left_by(W: Array, still: Flags, side: int) -> Flags:
@@ -82,8 +93,20 @@ def left_by(W: Array, still: Flags, side: int) -> Flags:
         if size.max() >= max(FEWEST, own.sum() + 1):
             own = np.asarray(part == size.argmax())
         if own.sum() >= LEFT:
-            break
+            return with_those_that_follow(W, own, ~still, edges)
     return own
+
+
+def with_those_that_follow(W: Array, own: Flags, others: Flags, edges: Indices) -> Flags:
+    """Points (P,) and of others (P,) those beside them, by edges (n, 2), that go as they do in all frames W (F, P, 2)."""
+    while True:
+        off, carried, way = astray_px(W, own)
+        follows = others & ~own & (way > STRAY_PX) & (off < np.maximum(STRAY_PX, FOLLOWS * carried))
+        beside = np.zeros_like(own)
+        beside[edges[own[edges].any(axis=1)]] = True
+        if not (follows & beside).any():
+            return own
+        own = own | (follows & beside)
 
 
 def middling(place: Array, region: Image) -> Array:
