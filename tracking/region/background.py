@@ -15,7 +15,7 @@ AGREED = 0.75  # of the points at the border must be of it, and half of those in
 STILL_PX = 2.0  # a camera by which the border moves less stands still
 
 
-def by_first_camera(tracks: Sequence[Array], size: tuple[int, int]) -> tuple[list[Array], float]:
+def by_first_camera(tracks: Sequence[Array], size: tuple[int, int], agreed: float = AGREED) -> tuple[list[Array], float]:
     """Tracks (P, 2) px each as the camera of the first would have seen them, were all of it as far as what is behind.
 
     As they are where the border does not move, or not as one in all frames: then what is there may bend.
@@ -23,12 +23,13 @@ def by_first_camera(tracks: Sequence[Array], size: tuple[int, int]) -> tuple[lis
     Args:
         tracks: NaN where not seen.
         size: width and height of the picture.
+        agreed: so many of the points at the border must be of it.
 
     Returns:
         The tracks; how far the camera's motion took its border in the frame where it was farthest, px.
     """
-    sectors = at_border(tracks[0], np.array(size))
-    motions = [motion(tracks[0], now, sectors) for now in tracks[1:]]
+    sectors = by_sector(tracks[0], np.array(size))
+    motions = [motion(tracks[0], now, sectors, agreed) for now in tracks[1:]]
     known = [one for one in motions if one is not None]
     moved_px = max((px for _, px in known), default=0.0)
     if len(known) < len(motions) or moved_px < STILL_PX:
@@ -37,14 +38,18 @@ def by_first_camera(tracks: Sequence[Array], size: tuple[int, int]) -> tuple[lis
 
 
 def at_border(points: Array, size: Array) -> Flags:
-    """Which points (P, 2) px are near the border of a picture, by the direction from its middle: (SECTORS, P)."""
-    off = (points + 0.5) / size - 0.5
-    direction = np.floor(np.arctan2(off[:, 1], off[:, 0]) / (2 * np.pi) * SECTORS + 0.5).astype(int) % SECTORS
-    near = np.abs(off).max(axis=1) > 0.5 - BAND
-    return near & (direction == np.arange(SECTORS)[:, None])
+    """Which points (P, 2) px are near the border of a picture, (P,)."""
+    return np.asarray(np.abs((points + 0.5) / size - 0.5).max(axis=1) > 0.5 - BAND)
 
 
-def motion(first: Array, now: Array, sectors: Flags) -> tuple[Array, float] | None:
+def by_sector(points: Array, size: Array) -> Flags:
+    """The same by the direction from the picture's middle, (SECTORS, P)."""
+    x, y = ((points + 0.5) / size - 0.5).T
+    direction = np.floor(np.arctan2(y, x) / (2 * np.pi) * SECTORS + 0.5).astype(int) % SECTORS
+    return at_border(points, size) & (direction == np.arange(SECTORS)[:, None])
+
+
+def motion(first: Array, now: Array, sectors: Flags, agreed: float) -> tuple[Array, float] | None:
     """The camera's motion between points at first and now (P, 2) px: a homography (3, 3) back, and how far it took them.
 
     None where the border does not tell.
@@ -54,7 +59,7 @@ def motion(first: Array, now: Array, sectors: Flags) -> tuple[Array, float] | No
     if (count >= FEWEST).sum() < AGREEING:
         return None
     H, inlier = cv2.findHomography(now[band], first[band], cv2.RANSAC, OFF_PX)
-    if H is None or inlier.mean() < AGREED:
+    if H is None or inlier.mean() < agreed:
         return None
     of_it = np.zeros(len(first), np.bool_)
     of_it[band] = inlier[:, 0] > 0

@@ -9,7 +9,7 @@ import numpy as np
 from tracking import Array, Flags, Image, TrackingError
 from tracking.features import detect_corners
 from tracking.flow import CONVERGED_PX, FEW_GUIDES, Grays, levels_of, lucas_kanade, returned
-from tracking.region.background import by_first_camera
+from tracking.region.background import AGREED, by_first_camera
 from tracking.region.border import at_colours
 from tracking.region.groups import TENTH
 from tracking.region.surface import FAR_ENOUGH, STILL_PX, Surface, middling, surfaces
@@ -20,6 +20,7 @@ MIDDLE = 0.5  # of a region that was drawn: nearer to its middle than to its bor
 SEEN = 0.5  # of the points: fewer left say nothing of the others, or it is another picture
 CLEARER = 2.0  # times the contrast of the first frame: it was still fading in
 PARALLAX = 0.15  # of how far the camera's motion takes what is behind, things nearer by may go otherwise, and be still
+MOSTLY = 0.4  # of the border's points by one motion: of a room they are by several, but that is most of it
 COMPARED = 20  # of those frames that are compared
 WINDOW_PX = 15
 WIDE_PX = 31  # leads points that do not come back: fast ones. It sees across borders, so the other has the last word
@@ -108,7 +109,7 @@ class Search:
             if good.sum() < SEEN * len(last) or self._contrast_now() > CLEARER * self._contrast:
                 return False
         self._tracks.append(moved)
-        (first, now), _ = still([self._tracks[0], moved], self._region)
+        (first, now), _ = still([self._tracks[0], moved], self._region, MOSTLY)
         self._way = np.fmax(self._way, np.linalg.norm(now - first, axis=1))
         return True
 
@@ -133,9 +134,9 @@ class Search:
         return float(self._grays.half[self._region[::2, ::2] > 0].std())
 
 
-def still(tracks: list[Array], region: Image) -> tuple[list[Array], float]:
+def still(tracks: list[Array], region: Image, agreed: float = AGREED) -> tuple[list[Array], float]:
     """As `by_first_camera`; tracks (P, 2) as they are in a region (H, W) that somebody chose, which may be all surface."""
-    return by_first_camera(tracks, (region.shape[1], region.shape[0])) if region.all() else (tracks, 0.0)
+    return by_first_camera(tracks, (region.shape[1], region.shape[0]), agreed) if region.all() else (tracks, 0.0)
 
 
 def compared(tracks: list[Array]) -> Array:

@@ -8,11 +8,13 @@ import numpy as np
 
 from tracking import Array, Flags, Floats, Image, Indices
 from tracking.consistency import spacing_px
+from tracking.region.background import at_border
 from tracking.region.groups import FEWEST, connected, edges_beside, groups_of
 
 STILL_PX = 2.0  # a group that moves less does not move, before a camera that does not
 BESIDE = 8  # points of the surface that say where a point beside them should go
 STRAY_PX = 3.0  # a point no farther from where the surface would carry it is not of something else, and ...
+OUTSIDE = 0.35  # of its points are at the picture's border: it is behind what is not
 FOLLOWS = 0.25  # of the way that those beside it go, a point that goes with them may be off
 SHARED = 0.5  # ... one that goes so much of its way: a lip or a chin goes farther, what is behind stays
 REACH = 1.0  # times the usual distance between points on it, that the surface goes on beyond them
@@ -62,14 +64,18 @@ def surfaces(W: Array, region: Image, still_px: float = STILL_PX) -> list[Surfac
     way = found.motion_px if region.all() else found.motion_px.clip(max=FAR_ENOUGH * side)
     score = np.where(found.motion_px > still_px, size * way, 0.0)
     order = [int(k) for k in np.argsort(-score, kind="stable") if score[k] > OTHER_SHARE * score.max()]
-    groups = [found.label == k for k in order]
-    still = np.isin(found.label, np.flatnonzero(found.motion_px <= still_px))
-    if still.any() and region.all():  # one that was drawn may be all the surface
-        loose = left_by(W, still, side)
-        if loose.any() and (not groups or whole(loose, groups[0])):
-            groups = [loose, *(group for group in groups if not (group & loose).any())]
-            return [surface_of(W, group, np.any([still, *groups], axis=0), region) for group in groups]
-    return [surface_of(W, group, found.label >= 0, region) for group in groups]
+    groups, behind = [found.label == k for k in order], np.isin(found.label, np.flatnonzero(found.motion_px <= still_px))
+    if region.all():  # one that was drawn may be all the surface
+        border = at_border(W[0], np.array(region.shape[::-1]))
+        outside = [group for group in groups if border[group].mean() > OUTSIDE]
+        behind = np.any([behind, *outside], axis=0)
+        inside = [group for group in groups if border[group].mean() <= OUTSIDE]
+        loose = left_by(W, behind, side) if behind.any() else behind
+        if loose.any() and (not outside or border[loose].mean() <= OUTSIDE) and (not inside or whole(loose, inside[0])):
+            inside = [loose, *(group for group in inside if not (group & loose).any())]
+        groups = inside or groups
+    grouped = np.any([found.label >= 0, *groups], axis=0) if groups else behind
+    return [surface_of(W, group, grouped, region) for group in groups]
 
 
 def whole(loose: Flags, group: Flags) -> bool:
