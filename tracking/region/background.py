@@ -11,6 +11,7 @@ BAND = 0.15  # of the picture's sides: points so near to its border are of what 
 SECTORS, AGREEING = 8, 5  # of the picture's border, and how many must tell the same: head and shoulders hide three
 FEWEST = 4  # points of one that tells
 OFF_PX = 2.0  # from where the camera's motion takes them, points are not of it
+TRIALS = 200  # of four points that are of it: enough where it has a third of them
 AGREED = 0.75  # of the points at the border must be of it, and half of those in a sector: of a sheet that bends fewer are
 STILL_PX = 2.0  # a camera by which the border moves less stands still
 
@@ -58,7 +59,9 @@ def motion(first: Array, now: Array, sectors: Flags, agreed: float) -> tuple[Arr
     band, count = told.any(axis=0), told.sum(axis=1)
     if (count >= FEWEST).sum() < AGREEING:
         return None
-    H, inlier = cv2.findHomography(now[band], first[band], cv2.RANSAC, OFF_PX)
+    if np.median(np.linalg.norm(now - first, axis=1)[band]) < STILL_PX:
+        return np.eye(3), 0.0
+    H, inlier = cv2.findHomography(now[band], first[band], cv2.RANSAC, OFF_PX, maxIters=TRIALS)
     if H is None or inlier.mean() < agreed:
         return None
     of_it = np.zeros(len(first), np.bool_)

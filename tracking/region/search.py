@@ -83,12 +83,12 @@ class Search:
     @property
     def moved_px(self) -> float:
         """How far the farthest tenth of what is in the middle has moved."""
-        return float(np.quantile(self._way[self._middle], TENTH))
+        return farthest_px(self._way[self._middle])
 
     @property
     def enough(self) -> bool:
         """Whether further frames would not tell more."""
-        return self.frames >= MOST_FRAMES or self.moved_px > FAR_ENOUGH * max(self._region.shape)
+        return self.frames >= MOST_FRAMES or self._far(self._way)
 
     @property
     def faint(self) -> bool:
@@ -109,8 +109,11 @@ class Search:
             if good.sum() < SEEN * len(last) or self._contrast_now() > CLEARER * self._contrast:
                 return False
         self._tracks.append(moved)
-        (first, now), _ = still([self._tracks[0], moved], self._region, MOSTLY)
-        self._way = np.fmax(self._way, np.linalg.norm(now - first, axis=1))
+        way = np.linalg.norm(moved - self._tracks[0], axis=1)
+        if self._far(way):  # unless it is the camera that went
+            (first, now), _ = still([self._tracks[0], moved], self._region, MOSTLY)
+            way = np.linalg.norm(now - first, axis=1)
+        self._way = np.fmax(self._way, way)
         return True
 
     def found(self) -> tuple[Image, list[Surface]]:
@@ -129,9 +132,18 @@ class Search:
             raise TrackingError(f"nothing moves in {self.frames} frames")
         return region
 
+    def _far(self, way: Array) -> bool:
+        """Whether that is enough, by how far (P,) px each point went."""
+        return farthest_px(way[self._middle]) > FAR_ENOUGH * max(self._region.shape)
+
     def _contrast_now(self) -> float:
         """Standard deviation of the grey levels in the region."""
         return float(self._grays.half[self._region[::2, ::2] > 0].std())
+
+
+def farthest_px(way: Array) -> float:
+    """How far the farthest tenth of points went, by the way (P,) px of each, NaN where that is not known."""
+    return float(np.nanquantile(way, TENTH)) if np.isfinite(way).any() else 0.0
 
 
 def still(tracks: list[Array], region: Image, agreed: float = AGREED) -> tuple[list[Array], float]:
@@ -139,10 +151,10 @@ def still(tracks: list[Array], region: Image, agreed: float = AGREED) -> tuple[l
     return by_first_camera(tracks, (region.shape[1], region.shape[0]), agreed) if region.all() else (tracks, 0.0)
 
 
-def compared(tracks: list[Array]) -> Array:
-    """Tracks (F, P, 2) in frames well spread, most of them early: what is soon covered shows only there how it goes."""
+def compared(tracks: list[Array]) -> list[Array]:
+    """Tracks (P, 2) in frames well spread, most of them early: what is soon covered shows only there how it goes."""
     chosen = np.unique(((len(tracks) - 1) * np.linspace(0, 1, COMPARED) ** 2).round().astype(int))
-    return np.stack([tracks[k] for k in chosen])
+    return [tracks[k] for k in chosen]
 
 
 def found(tracks: list[Array], region: Image, image_bgr: Image) -> tuple[Image, list[Surface]]:
@@ -155,8 +167,8 @@ def found(tracks: list[Array], region: Image, image_bgr: Image) -> tuple[Image, 
         region: (H, W) uint8.
         image_bgr: (H, W, 3) uint8, that picture.
     """
-    W, camera_px = still(tracks, region)
-    moving = surfaces(compared(W), region, max(STILL_PX, PARALLAX * camera_px))
+    W, camera_px = still(compared(tracks), region)
+    moving = surfaces(np.stack(W), region, max(STILL_PX, PARALLAX * camera_px))
     if moving:
         best = moving[0]
         left_out = ~best.own if region.all() else best.other  # nobody has chosen a picture's corners

@@ -70,10 +70,10 @@ def surfaces(W: Array, region: Image, still_px: float = STILL_PX) -> list[Surfac
         outside = [group for group in groups if border[group].mean() > OUTSIDE]
         behind = np.any([behind, *outside], axis=0)
         inside = [group for group in groups if border[group].mean() <= OUTSIDE]
-        loose = left_by(W, behind, side) if behind.any() else behind
+        loose = left_by(W, behind, side, 2 * int(inside[0].sum()) if inside else FEWEST)
         if loose.any() and (not outside or border[loose].mean() <= OUTSIDE) and (not inside or whole(loose, inside[0])):
             inside = [loose, *(group for group in inside if not (group & loose).any())]
-        groups = inside or groups
+        groups = inside + outside
     grouped = np.any([found.label >= 0, *groups], axis=0) if groups else behind
     return [surface_of(W, group, grouped, region) for group in groups]
 
@@ -83,17 +83,18 @@ def whole(loose: Flags, group: Flags) -> bool:
     return bool((group & loose).sum() > 0.5 * group.sum() and group.sum() < 0.5 * loose.sum())
 
 
-def left_by(W: Array, still: Flags, side: int) -> Flags:
-    """Most points (P,) beside each other that do not go where a group (P,) would carry them, or none.
+def left_by(W: Array, still: Flags, side: int, least: int) -> Flags:
+    """Most points (P,) beside each other that do not go where others (P,) would carry them; none, if fewer than least go.
 
     Where hardly anything but what is behind has a group, what goes its own way is the surface: small, or lost again and
     again. In the first frames that tell: later it covers points that were behind, and takes them along.
     """
-    edges = edges_beside(W[0], side)
     own = np.zeros_like(still)
+    if not still.any() or leaving(W, still).sum() < least:
+        return own
+    edges = edges_beside(W[0], side)
     for frames in range(2, len(W) + 1):
-        off, _, way = astray_px(W[:frames], still)
-        loose = ~still & (off > STRAY_PX) & (way > STILL_PX)
+        loose = leaving(W[:frames], still)
         part = np.where(loose, connected(edges[loose[edges].all(axis=1)], len(loose)), -1)
         size = np.bincount(part[loose], minlength=1)
         if size.max() >= max(FEWEST, own.sum() + 1):
@@ -101,6 +102,12 @@ def left_by(W: Array, still: Flags, side: int) -> Flags:
         if own.sum() >= LEFT:
             return with_those_that_follow(W, own, ~still, edges)
     return own
+
+
+def leaving(W: Array, still: Flags) -> Flags:
+    """Which points (P,) go, but not where others (P,) would carry them."""
+    off, _, way = astray_px(W, still)
+    return np.asarray(~still & (off > STRAY_PX) & (way > STILL_PX))
 
 
 def with_those_that_follow(W: Array, own: Flags, others: Flags, edges: Indices) -> Flags:
