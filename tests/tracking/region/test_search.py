@@ -48,6 +48,18 @@ def test_a_box_before_a_wall_is_found() -> None:
     assert found.frames < 40  # it has moved enough by then
 
 
+def test_a_box_before_a_wall_is_found_by_a_camera_that_is_held_by_hand() -> None:
+    frames = []
+    for frame in scene((90, 60, 130, 110, 25.0)):
+        k = frame.index
+        held = np.float32([[1, 0, 14 * np.sin(0.3 * k)], [0, 1, 9 * np.sin(0.21 * k)]])
+        image = cv2.warpAffine(frame.image, held, (320, 240), borderMode=cv2.BORDER_REFLECT)
+        frames.append(replace(frame, image=np.asarray(image, np.uint8)))
+    found = search(frames, WHOLE)
+    assert found.narrowed
+    assert overlap(found, 90, 60, 130, 110) > 0.7
+
+
 def test_where_it_is_in_the_last_frame_is_known_too() -> None:
     frames = list(scene((90, 60, 130, 110, 25.0), frames=25))
     looked = Search(frames[0].image, WHOLE)
