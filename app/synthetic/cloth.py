@@ -16,7 +16,7 @@ ASPECT = 0.75
 STEPS = 40  # of a thirtieth of a second
 RATE = 30.0  # a second
 FRAMES = 120  # that are watched, thirty a second
-WARM_UP = 40  # thirtieths of a second before it is watched
+WARM_UP = 20  # thirtieths of a second before it is watched
 GRAVITY = np.array([0.0, 2.5, 0.0])
 DRAG = 4.0  # what a unit of air speed across the cloth gives of acceleration
 BENDING, SHEAR = 0.1, 0.5  # share of what a step would have to undo that it does; of lengths all of it
@@ -30,9 +30,9 @@ class Springs:
     """Pairs of vertices that share none, so that they can be moved at once.
 
     Attributes:
-        first, second: views (r, c, 3) of the vertices.
-        rest: (r, c, 1) their distances at rest.
-        moves_first, moves_second: (r, c, 1) how much of a pair's error each takes.
+        first, second: views (3, r, c) of the vertices.
+        rest: (r, c) their distances at rest.
+        moves_first, moves_second: (r, c) how much of a pair's error each takes.
     """
 
     first: Array
@@ -44,16 +44,20 @@ class Springs:
     def pull(self) -> None:
         """Move them towards their distances."""
         apart = self.second - self.first
-        length = np.sqrt((apart**2).sum(axis=-1, keepdims=True))
-        apart *= (length - self.rest) / length
+        apart *= 1 - self.rest / norm(apart)
         np.add(self.first, self.moves_first * apart, out=self.first)
         np.subtract(self.second, self.moves_second * apart, out=self.second)
 
 
+def norm(X: Array) -> Array:
+    """Lengths (r, c) of vectors (3, r, c)."""
+    return np.asarray(np.sqrt(X[0] ** 2 + X[1] ** 2 + X[2] ** 2))
+
+
 def net() -> Array:
-    """Vertices (ROWS, COLUMNS, 3) of the flat cloth."""
+    """Vertices (3, ROWS, COLUMNS) of the flat cloth."""
     x, y = np.meshgrid(np.linspace(-0.5, 0.5, COLUMNS), np.linspace(-0.5, 0.5, ROWS) * ASPECT)
-    return np.stack([x, y, np.zeros_like(x)], axis=-1)
+    return np.stack([x, y, np.zeros_like(x)])
 
 
 def gusts(rng: np.random.Generator, mean: tuple[float, float, float], sway: tuple[float, float, float]) -> Vector:
@@ -63,7 +67,7 @@ def gusts(rng: np.random.Generator, mean: tuple[float, float, float], sway: tupl
 
 
 def filmed(held: Flags, hand: Vector, wind: Vector) -> Callable[[Array, float], Array]:
-    """What gives places (n, 2) of a cloth at a time from 0 to 1 their points (n, 3)."""
+    """What gives places (n, 2) of a cloth at a time from 0 to 1 their points (n, 3); see `simulated`."""
     shapes = simulated(held, hand, wind)
     y, x = np.linspace(-0.5, 0.5, ROWS) * ASPECT, np.linspace(-0.5, 0.5, COLUMNS)
 
@@ -71,13 +75,13 @@ def filmed(held: Flags, hand: Vector, wind: Vector) -> Callable[[Array, float], 
         at = time * (len(shapes) - 1)
         first = min(int(at), len(shapes) - 2)
         now = shapes[first] + (at - first) * (shapes[first + 1] - shapes[first])
-        return np.column_stack([RectBivariateSpline(y, x, now[..., k]).ev(places[:, 1], places[:, 0]) for k in range(3)])
+        return np.column_stack([RectBivariateSpline(y, x, one).ev(places[:, 1], places[:, 0]) for one in now])
 
     return shape
 
 
 def simulated(held: Flags, hand: Vector, wind: Vector) -> Array:
-    """Shapes (FRAMES, ROWS, COLUMNS, 3), thirty a second.
+    """Shapes (FRAMES, 3, ROWS, COLUMNS), thirty a second.
 
     Args:
         held: (ROWS, COLUMNS) vertices that are where the hand has them.
@@ -92,13 +96,13 @@ def simulated(held: Flags, hand: Vector, wind: Vector) -> Array:
         time = tick * step
         if tick >= 0 and tick % STEPS == 0:
             shapes.append(X.copy())
-        normal = np.cross(np.gradient(X, axis=0), np.gradient(X, axis=1))
-        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-        across = ((wind(time) - V) * normal).sum(axis=-1, keepdims=True)
-        V += step * (GRAVITY + DRAG * np.abs(across) ** 0.5 * np.sign(across) * normal)
+        normal = np.cross(np.gradient(X, axis=1), np.gradient(X, axis=2), axis=0)
+        normal /= norm(normal)
+        across = ((wind(time)[:, None, None] - V) * normal).sum(axis=0)
+        V += step * (GRAVITY[:, None, None] + DRAG * np.sign(across) * np.sqrt(np.abs(across)) * normal)
         before = X.copy()
         X += step * V
-        X[held] = flat[held] + hand(time)
+        X[:, held] = flat[:, held] + hand(time)[:, None]
         for spring in springs:
             spring.pull()
         V = (X - before) / step
@@ -106,8 +110,8 @@ def simulated(held: Flags, hand: Vector, wind: Vector) -> Array:
 
 
 def pairs(X: Array, flat: Array, free: Flags) -> Iterator[Springs]:
-    """Springs between vertices beside each other, across, and beyond the next, as views of X."""
-    weight = free[..., None].astype(np.float64)
+    """Springs between vertices beside each other, across, and beyond the next, as views of X (3, ROWS, COLUMNS)."""
+    weight = free.astype(np.float64)
     for down, right, strength in NEIGHBOURS:
         rows = slice(None, -down or None), slice(down, None)
         columns = (
@@ -116,7 +120,7 @@ def pairs(X: Array, flat: Array, free: Flags) -> Iterator[Springs]:
         axis, reach = (0, down) if down else (1, right)
         for phase in range(2 * reach):
             every = tuple(slice(phase, None, 2 * reach) if k == axis else slice(None) for k in range(2))
-            ends = [[of[rows[k], columns[k]][every] for of in (X, flat, weight)] for k in range(2)]
+            ends = [[of[..., rows[k], columns[k]][..., *every] for of in (X, flat, weight)] for k in range(2)]
             (first, here, w), (second, there, v) = ends
             share = strength / np.maximum(w + v, 1.0)
-            yield Springs(first, second, np.linalg.norm(there - here, axis=-1, keepdims=True), share * w, share * v)
+            yield Springs(first, second, norm(there - here), share * w, share * v)
