@@ -29,7 +29,7 @@ class Case:
         before: pictures that come first, by the size.
         stretch: factors of the pixels along x and y.
         mirrored: whether left and right change places.
-        loose: by how much the region is larger than the surface, as a share of its sides.
+        loose: by how much the region is larger than the surface, as a share of its sides; None where nobody tells it.
         storage: how it is written.
     """
 
@@ -42,17 +42,17 @@ class Case:
     before: Callable[[tuple[int, int]], list[Image]] = lambda _: []
     stretch: tuple[float, float] = (1.0, 1.0)
     mirrored: bool = False
-    loose: float = 0.0
+    loose: float | None = 0.0
     storage: Storage = field(default_factory=Storage)
 
 
 @dataclass(frozen=True)
 class Copy:
-    """A degraded copy: what it is read from, its truth, and where the surface is in its first frame."""
+    """A degraded copy: what it is read from, its truth, and where the surface is in its first frame, if that is told."""
 
     source: str
     truth: Path
-    roi: Region
+    roi: Region | None
 
 
 def write(clip: Clip, case: Case, folder: Path) -> Copy:
@@ -72,7 +72,7 @@ def write(clip: Clip, case: Case, folder: Path) -> Copy:
         gt_frames=[number[int(known.frames[k])] for k in rows],
         K=shown.K,
     )
-    return Copy(source, folder / "truth.npz", shown.region())
+    return Copy(source, folder / "truth.npz", None if case.loose is None else shown.region(case.loose))
 
 
 class Turned:
@@ -118,13 +118,13 @@ class Turned:
         """Its axes (3, 3) in a frame by those of the clip's camera."""
         return np.diag([-1.0 if self._case.mirrored else 1.0, 1.0, 1.0]) @ self._case.turn(self._clip, frame)
 
-    def region(self) -> Region:
-        """Where the surface is in the first frame."""
+    def region(self, loose: float) -> Region:
+        """Where the surface is in the first frame, sides longer by a share of them."""
         x, y, w, h = self._clip.roi
         corners = np.array([[x, x + w - 1, x + w - 1, x], [y, y, y + h - 1, y + h - 1]], np.float64)
         corners = self.points(self._case.phase, corners)
         low, high = corners.min(axis=1), corners.max(axis=1)
-        margin = 0.5 * self._case.loose * (high - low)
+        margin = 0.5 * loose * (high - low)
         left, top = np.ceil(np.maximum(low - margin, 0)).astype(int)
         right, bottom = np.floor(np.minimum(high + margin, np.array(self.size) - 1)).astype(int)
         return int(left), int(top), int(right - left + 1), int(bottom - top + 1)

@@ -39,6 +39,7 @@ _CASES = (
         for moves in (False, True)
         for loose in (0.0, 0.5)
     ),
+    Case("background moving, region found", 3.5, (background(moves=True),), loose=None),
     Case("light alternating", 2.7, (alternating(0.18),)),
     Case("light at random", 2.7, (at_random(0.4),)),
     Case("light in rolling bands", 2.7, (bands(0.3),)),

@@ -50,7 +50,7 @@ class Result:
         return float(self.e3d[chosen].mean())
 
 
-def run(video: Path, truth: Path, roi: tuple[int, int, int, int], folder: Path, frames: str = ":") -> Result:
+def run(video: Path, truth: Path, roi: tuple[int, int, int, int] | None, folder: Path, frames: str = ":") -> Result:
     """Run the whole pipeline over frames of a video, without a recording's pictures."""
     output = Output(
         out=folder / "run.rrd",

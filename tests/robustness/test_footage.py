@@ -24,6 +24,7 @@ def outcome(clip: Clip, name: str, folder: Path) -> Result:
     [
         ("light in rolling bands", 0),
         ("background moving, region loose", 0),
+        ("background moving, region found", 0),
         ("a title card first", 0),
         ("leaves the picture, all", 2),
         ("watermark over 30 %", 0),

@@ -60,6 +60,7 @@ def test_the_truth_is_where_the_picture_shows_it(dots: Clip, tmp_path: Path, nam
             assert (pictures[int(frame)][y, x] > 150).all()
             looked_at += int(inside.sum())
     assert looked_at > 50
+    assert copy.roi is not None
     x, y, w, h = copy.roi
     assert min(x, y) >= 0
     assert ((x + w, y + h) <= size).all()
