@@ -64,50 +64,54 @@ def surfaces(W: Array, region: Image, still_px: float = STILL_PX) -> list[Surfac
     way = found.motion_px if region.all() else found.motion_px.clip(max=FAR_ENOUGH * side)
     score = np.where(found.motion_px > still_px, size * way, 0.0)
     order = [int(k) for k in np.argsort(-score, kind="stable") if score[k] > OTHER_SHARE * score.max()]
-    groups, behind = [found.label == k for k in order], np.isin(found.label, np.flatnonzero(found.motion_px <= still_px))
+    groups, still = [found.label == k for k in order], np.isin(found.label, np.flatnonzero(found.motion_px <= still_px))
     if region.all():  # one that was drawn may be all the surface
-        border = at_border(W[0], np.array(region.shape[::-1]))
-        outside = [group for group in groups if border[group].mean() > OUTSIDE]
-        behind = np.any([behind, *outside], axis=0)
-        inside = [group for group in groups if border[group].mean() <= OUTSIDE]
-        loose = left_by(W, behind, side, 2 * int(inside[0].sum()) if inside else FEWEST)
-        if loose.any() and (not outside or border[loose].mean() <= OUTSIDE) and (not inside or whole(loose, inside[0])):
-            inside = [loose, *(group for group in inside if not (group & loose).any())]
-        groups = inside + outside
-    grouped = np.any([found.label >= 0, *groups], axis=0) if groups else behind
+        groups = in_front(W, groups, still, region)
+    grouped = np.any([found.label >= 0, *groups], axis=0)
     return [surface_of(W, group, grouped, region) for group in groups]
 
 
-def whole(loose: Flags, group: Flags) -> bool:
-    """Whether a group (P,) is a small part of what leaves what is behind (P,), not a small thing beside it."""
-    return bool((group & loose).sum() > 0.5 * group.sum() and group.sum() < 0.5 * loose.sum())
+def in_front(W: Array, groups: list[Flags], still: Flags, region: Image) -> list[Flags]:
+    """Groups (P,) of a whole picture, the best first, as in front of what is behind: what is still (P,), or at the border.
+
+    Those at the border come last. What leaves what is behind is the first, if the first is a small part of that, or none.
+    """
+    border = at_border(W[0], np.array(region.shape[::-1]))
+    outside = [group for group in groups if border[group].mean() > OUTSIDE]
+    inside = [group for group in groups if border[group].mean() <= OUTSIDE]
+    behind, least = np.any([still, *outside], axis=0), 2 * int(inside[0].sum()) if inside else FEWEST
+    loose = left_by(W, behind, max(region.shape), least)
+    holds_it = not inside or (inside[0] & loose).sum() > 0.5 * inside[0].sum()
+    if loose.sum() >= least and holds_it and (not outside or border[loose].mean() <= OUTSIDE):
+        inside = [loose, *(group for group in inside if not (group & loose).any())]
+    return inside + outside
 
 
-def left_by(W: Array, still: Flags, side: int, least: int) -> Flags:
+def left_by(W: Array, behind: Flags, side: int, least: int) -> Flags:
     """Most points (P,) beside each other that do not go where others (P,) would carry them; none, if fewer than least go.
 
     Where hardly anything but what is behind has a group, what goes its own way is the surface: small, or lost again and
     again. In the first frames that tell: later it covers points that were behind, and takes them along.
     """
-    own = np.zeros_like(still)
-    if not still.any() or leaving(W, still).sum() < least:
+    own = np.zeros_like(behind)
+    if not behind.any() or leaving(W, behind).sum() < least:
         return own
     edges = edges_beside(W[0], side)
     for frames in range(2, len(W) + 1):
-        loose = leaving(W[:frames], still)
+        loose = leaving(W[:frames], behind)
         part = np.where(loose, connected(edges[loose[edges].all(axis=1)], len(loose)), -1)
         size = np.bincount(part[loose], minlength=1)
         if size.max() >= max(FEWEST, own.sum() + 1):
             own = np.asarray(part == size.argmax())
         if own.sum() >= LEFT:
-            return with_those_that_follow(W, own, ~still, edges)
+            return with_those_that_follow(W, own, ~behind, edges)
     return own
 
 
-def leaving(W: Array, still: Flags) -> Flags:
+def leaving(W: Array, behind: Flags) -> Flags:
     """Which points (P,) go, but not where others (P,) would carry them."""
-    off, _, way = astray_px(W, still)
-    return np.asarray(~still & (off > STRAY_PX) & (way > STILL_PX))
+    off, _, way = astray_px(W, behind)
+    return np.asarray(~behind & (off > STRAY_PX) & (way > STILL_PX))
 
 
 def with_those_that_follow(W: Array, own: Flags, others: Flags, edges: Indices) -> Flags:
