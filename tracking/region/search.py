@@ -21,6 +21,7 @@ SEEN = 0.5  # of the points: fewer left say nothing of the others, or it is anot
 CLEARER = 2.0  # times the contrast of the first frame: it was still fading in
 PARALLAX = 0.15  # of how far the camera's motion takes what is behind, things nearer by may go otherwise, and be still
 MOSTLY = 0.4  # of the border's points by one motion: of a room they are by several, but that is most of it
+ALONE = 0.05  # of the points go another way than the camera takes them: fewer are nothing
 COMPARED = 20  # of those frames that are compared
 WINDOW_PX = 15
 WIDE_PX = 31  # leads points that do not come back: fast ones. It sees across borders, so the other has the last word
@@ -110,9 +111,10 @@ class Search:
                 return False
         self._tracks.append(moved)
         way = np.linalg.norm(moved - self._tracks[0], axis=1)
-        if self._far(way):  # unless it is the camera that went
+        if self._far(way):  # unless it is the camera that went, and something else goes its own way
             (first, now), _ = still([self._tracks[0], moved], self._region, MOSTLY)
-            way = np.linalg.norm(now - first, axis=1)
+            own = np.linalg.norm(now - first, axis=1)
+            way = own if np.nanmean(own > STILL_PX) > ALONE else way
         self._way = np.fmax(self._way, way)
         return True
 
@@ -167,8 +169,11 @@ def found(tracks: list[Array], region: Image, image_bgr: Image) -> tuple[Image, 
         region: (H, W) uint8.
         image_bgr: (H, W, 3) uint8, that picture.
     """
-    W, camera_px = still(compared(tracks), region)
-    moving = surfaces(np.stack(W), region, max(STILL_PX, PARALLAX * camera_px))
+    W = compared(tracks)
+    by_first, camera_px = still(W, region)
+    moving = surfaces(np.stack(by_first), region, max(STILL_PX, PARALLAX * camera_px))
+    if not moving and camera_px:  # what is at the border is all there is
+        moving = surfaces(np.stack(W), region)
     if moving:
         best = moving[0]
         left_out = ~best.own if region.all() else best.other  # nobody has chosen a picture's corners

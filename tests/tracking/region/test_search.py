@@ -60,6 +60,18 @@ def test_a_box_before_a_wall_is_found_by_a_camera_that_is_held_by_hand() -> None
     assert overlap(found, 90, 60, 130, 110) > 0.7
 
 
+def test_a_flat_sheet_that_fills_the_picture_is_the_surface_at_once() -> None:
+    frames = []
+    for k in range(60):
+        held = np.float32([[1, 0, 2.0 * k], [0, 1, 0.5 * k]])
+        image = cv2.warpAffine(texture(1), held, (320, 240), borderMode=cv2.BORDER_REFLECT)
+        frames.append(Frame(k, k / 30, np.asarray(image, np.uint8)))
+    found = search(frames, WHOLE)
+    assert found.surface is not None
+    assert (found.region > 0).mean() > 0.8
+    assert found.frames < 15
+
+
 def test_where_it_is_in_the_last_frame_is_known_too() -> None:
     frames = list(scene((90, 60, 130, 110, 25.0), frames=25))
     looked = Search(frames[0].image, WHOLE)
