@@ -46,8 +46,10 @@ def clean(made: Sample, tmp_path_factory: pytest.TempPathFactory) -> Result:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
-    [(flickering(0.4), blurred(8)), (noisy(10), compressed(30))],
-    ids=["light and blur", "noise and jpeg"],
+    [
+        pytest.param((flickering(0.4), blurred(8)), id="light and blur"),
+        pytest.param((noisy(10), compressed(30)), id="noise and jpeg", marks=pytest.mark.whole),
+    ],
 )
 def test_bad_pictures_cost_little(made: Sample, tmp_path: Path, changes: tuple[Change, ...]) -> None:
     pictures = changed(made.video, *changes, frames=FRAMES)

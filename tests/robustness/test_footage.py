@@ -25,9 +25,9 @@ def outcome(clip: Clip, name: str, folder: Path) -> Result:
         ("light in rolling bands", 0),
         ("background moving, region loose", 0),
         ("background moving, region found", 0),
-        ("a title card first", 0),
+        pytest.param("a title card first", 0, marks=pytest.mark.whole),
         ("leaves the picture, all", 2),
-        ("watermark over 30 %", 0),
+        pytest.param("watermark over 30 %", 0, marks=pytest.mark.whole),
     ],
 )
 def test_the_sample_holds(tmp_path: Path, name: str, losses: int) -> None:

@@ -37,7 +37,7 @@ def test_made_up_things_with_gaps_noise_and_gross_errors(tmp_path: Path, kind: s
     ("kind", "points", "damage", "bound"),
     [
         ("waving-3", 80, Damage(0.4, 0.3, 0.05), 0.02),
-        ("rolling", 80, Damage(0.4, 0.3, 0.05), 0.016),
+        pytest.param("rolling", 80, Damage(0.4, 0.3, 0.05), 0.016, marks=pytest.mark.whole),
         ("cone", 30, Damage(0.2, 0.3), 0.025),  # some frames show fewer than 20 points
     ],
 )
@@ -48,7 +48,7 @@ def test_sheets_of_few_points_with_gaps(tmp_path: Path, kind: str, points: int, 
     assert outcome.score.e3d <= bound
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.whole)])
 def test_a_waving_sheet_with_gaps_noise_and_gross_errors(shared_data: Path, tmp_path: Path, seed: int) -> None:
     outcome = evaluated(damaged(Tracks.load(shared_data / "waving_5.npz"), SEVERE, np.random.default_rng(seed)), tmp_path)
     assert outcome.rest_shape == "isometric"
