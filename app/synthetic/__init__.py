@@ -4,5 +4,5 @@
     tracks(scene)          points on it as `modeshape evaluate` takes them, with noise, gaps and gross errors
     write_video(scene, …)  pictures of it as `modeshape run` takes them, with the truth
 
-sheet, solid and balloon are shapes; path is how they are turned; nothing here is loaded by a run.
+sheet, solid and cloth are shapes; path is how they are turned; nothing here is loaded by a run.
 """

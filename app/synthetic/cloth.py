@@ -10,9 +10,9 @@ import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
 from app.arrays import Array, Flags
+from app.synthetic.places import grid
 
 COLUMNS, ROWS = 41, 31  # of its mesh
-ASPECT = 0.75
 STEPS = 40  # of a thirtieth of a second
 RATE = 30.0  # a second
 FRAMES = 120  # that are watched, thirty a second
@@ -20,6 +20,7 @@ WARM_UP = 20  # thirtieths of a second before it is watched
 GRAVITY = np.array([0.0, 2.5, 0.0])
 DRAG = 4.0  # what a unit of air speed across the cloth gives of acceleration
 BENDING, SHEAR = 0.1, 0.5  # share of what a step would have to undo that it does; of lengths all of it
+# How many rows down and columns to the right a vertex's neighbours are, and how much holds it to them.
 NEIGHBOURS = ((0, 1, 1.0), (1, 0, 1.0), (1, 1, SHEAR), (1, -1, SHEAR), (0, 2, BENDING), (2, 0, BENDING))
 
 Vector = Callable[[float], Array]  # of a time in s
@@ -56,7 +57,7 @@ def norm(X: Array) -> Array:
 
 def net() -> Array:
     """Vertices (3, ROWS, COLUMNS) of the flat cloth."""
-    x, y = np.meshgrid(np.linspace(-0.5, 0.5, COLUMNS), np.linspace(-0.5, 0.5, ROWS) * ASPECT)
+    x, y = grid(COLUMNS, ROWS).T.reshape(2, ROWS, COLUMNS)
     return np.stack([x, y, np.zeros_like(x)])
 
 
@@ -69,13 +70,13 @@ def gusts(rng: np.random.Generator, mean: tuple[float, float, float], sway: tupl
 def filmed(held: Flags, hand: Vector, wind: Vector) -> Callable[[Array, float], Array]:
     """What gives places (n, 2) of a cloth at a time from 0 to 1 their points (n, 3); see `simulated`."""
     shapes = simulated(held, hand, wind)
-    y, x = np.linspace(-0.5, 0.5, ROWS) * ASPECT, np.linspace(-0.5, 0.5, COLUMNS)
+    x, y, _ = net()
 
     def shape(places: Array, time: float) -> Array:
         at = time * (len(shapes) - 1)
         first = min(int(at), len(shapes) - 2)
         now = shapes[first] + (at - first) * (shapes[first + 1] - shapes[first])
-        return np.column_stack([RectBivariateSpline(y, x, one).ev(places[:, 1], places[:, 0]) for one in now])
+        return np.column_stack([RectBivariateSpline(y[:, 0], x[0], one).ev(places[:, 1], places[:, 0]) for one in now])
 
     return shape
 

@@ -7,9 +7,9 @@ import numpy as np
 from app.arrays import Array
 from app.synthetic.catalog import HELD_SEEDS, KINDS, Kind, Shape
 from app.synthetic.path import Path
+from app.synthetic.places import grid
 
 FRAMES = 120
-ASPECT = 0.75  # height of the rectangle that places are on, over its width, which is 1
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,3 @@ def scene(kind: str, seed: int, frames: int = FRAMES) -> Scene:
     one = KINDS[kind]
     held_back = one.held_back or seed >= HELD_SEEDS
     return Scene(f"{kind} {seed}", one, seed, frames, held_back, one.shape(rng), one.path(rng))
-
-
-def grid(columns: int, rows: int) -> Array:
-    """Places (columns·rows, 2) that cover the rectangle, row by row."""
-    x, y = np.meshgrid(np.linspace(-0.5, 0.5, columns), np.linspace(-0.5, 0.5, rows) * ASPECT)
-    return np.column_stack([x.ravel(), y.ravel()])

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.arrays import Array
 from app.demo.camera import K, project
-from app.synthetic.scene import ASPECT, Scene
+from app.synthetic.places import scattered
+from app.synthetic.scene import Scene
 from reconstruction.evaluation import with_missing, with_outliers
 from tracking.tracks import Tracks
 
@@ -48,12 +48,3 @@ def damaged(given: Tracks, damage: Damage, rng: np.random.Generator) -> Tracks:
     visible = with_missing(given.visible, damage.missing, rng)
     W = with_outliers(W, given.visible, damage.outliers, rng) if damage.outliers else W
     return Tracks(np.where(visible[:, None], W, np.nan), visible, given.K, given.S_gt, given.gt_frames)
-
-
-def scattered(rng: np.random.Generator, count: int) -> Array:
-    """Places (count, 2) on a jittered grid, in random order."""
-    columns = int(np.ceil(np.sqrt(count / ASPECT)))
-    rows = int(np.ceil(count / columns))
-    x, y = np.meshgrid((np.arange(columns) + 0.5) / columns - 0.5, (np.arange(rows) + 0.5) / rows - 0.5)
-    places = np.column_stack([x.ravel(), y.ravel()]) + rng.uniform(-0.3, 0.3, (columns * rows, 2)) / (columns, rows)
-    return np.asarray(rng.permutation(places)[:count] * (1.0, ASPECT))

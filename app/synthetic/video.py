@@ -11,7 +11,8 @@ from app.arrays import Array, Floats, Image
 from app.demo.camera import DESK, SIZE, K, project
 from app.painting.raster import Rasteriser
 from app.painting.shading import sampled
-from app.synthetic.scene import ASPECT, Scene, grid
+from app.synthetic.places import ASPECT, grid
+from app.synthetic.scene import Scene
 
 COLUMNS, ROWS = 97, 73  # of the mesh that is drawn
 TEXTURE_PX = 480  # width

@@ -8,7 +8,8 @@ import pytest
 
 from app.demo.camera import K, project
 from app.synthetic.catalog import HELD_SEEDS, KINDS
-from app.synthetic.scene import grid, scene
+from app.synthetic.places import grid
+from app.synthetic.scene import scene
 from app.synthetic.tracks import SEVERE, USUAL, tracks
 from app.synthetic.video import Renderer, region, write_video
 from tracking.tracks import Tracks, Truth
