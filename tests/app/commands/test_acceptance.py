@@ -156,12 +156,12 @@ def test_a_printed_sheet_is_followed(
 @pytest.mark.slow
 def test_a_talking_face_is_followed(modeshape: Command, shared_data: Path, here: Path) -> None:
     outcome = modeshape(
-        "run", shared_data / "talking_face.mp4", "--roi", 115, 70, 130, 160, "--frames", "0:300", "--json",
+        "run", shared_data / "talking_face.mp4", "--roi", 115, 70, 130, 160, "--frames", "0:200", "--json",
         "--out", "face.rrd", "--shapes-out", "shapes.npz",
     )  # fmt: skip
     assert outcome.code == 0, outcome.err
     words = json.loads(outcome.out)
-    assert words["frames"] == 300
+    assert words["frames"] == 200
     assert words["visible_share"] > 0.8
     assert words["reprojection_rms_px"] < 3
     with np.load("shapes.npz") as shapes:

@@ -54,7 +54,7 @@ def test_what_has_no_data_is_skipped(here: Path, modeshape: Command) -> None:
     assert readme.read_text().startswith("# Title")
 
 
-@pytest.mark.slow
+@pytest.mark.whole
 def test_real_data_give_the_first_table(shared_data: Path, tmp_path: Path) -> None:
     reproduced = reproduce(Reproduce(shared_data, tmp_path / "out", only=("accuracy",), quick=True), Progress())
     [table, published] = reproduced.experiments["accuracy"]["tables"]
