@@ -13,7 +13,7 @@ FEWEST = 4  # points of one that tells
 OFF_PX = 2.0  # from where the camera's motion takes them, points are not of it
 TRIALS = 200  # of four points that are of it: enough where it has a third of them
 AGREED = 0.75  # of the points at the border must be of it, and half of those in a sector: of a sheet that bends fewer are
-STILL_PX = 2.0  # a camera by which the border moves less stands still
+STILL_PX = 2.0  # what moves less stands still
 
 
 def by_first_camera(tracks: Sequence[Array], size: tuple[int, int], agreed: float = AGREED) -> tuple[list[Array], float]:

@@ -9,10 +9,10 @@ import numpy as np
 from tracking import Array, Flags, Image, TrackingError
 from tracking.features import detect_corners
 from tracking.flow import CONVERGED_PX, FEW_GUIDES, Grays, levels_of, lucas_kanade, returned
-from tracking.region.background import AGREED, by_first_camera
+from tracking.region.background import AGREED, STILL_PX, by_first_camera
 from tracking.region.border import at_colours
 from tracking.region.groups import TENTH
-from tracking.region.surface import FAR_ENOUGH, STILL_PX, Surface, middling, surfaces
+from tracking.region.surface import FAR_ENOUGH, Surface, middling, surfaces
 from tracking.video import Frame
 
 MOST_FRAMES = 90  # are looked at

@@ -8,14 +8,13 @@ import numpy as np
 
 from tracking import Array, Flags, Floats, Image, Indices
 from tracking.consistency import spacing_px
-from tracking.region.background import at_border
+from tracking.region.background import STILL_PX, at_border
 from tracking.region.groups import FEWEST, connected, edges_beside, groups_of
 
-STILL_PX = 2.0  # a group that moves less does not move, before a camera that does not
-BESIDE = 8  # points of the surface that say where a point beside them should go
-STRAY_PX = 3.0  # a point no farther from where the surface would carry it is not of something else, and ...
 OUTSIDE = 0.35  # of its points are at the picture's border: it is behind what is not
 FOLLOWS = 0.25  # of the way that those beside it go, a point that goes with them may be off
+BESIDE = 8  # points of the surface that say where a point beside them should go
+STRAY_PX = 3.0  # a point no farther from where the surface would carry it is not of something else, and ...
 SHARED = 0.5  # ... one that goes so much of its way: a lip or a chin goes farther, what is behind stays
 REACH = 1.0  # times the usual distance between points on it, that the surface goes on beyond them
 GAP = 2.0  # the same: narrower gaps between its parts are its own
