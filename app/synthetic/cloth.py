@@ -114,14 +114,12 @@ def pairs(X: Array, flat: Array, free: Flags) -> Iterator[Springs]:
     """Springs between vertices beside each other, across, and beyond the next, as views of X (3, ROWS, COLUMNS)."""
     weight = free.astype(np.float64)
     for down, right, strength in NEIGHBOURS:
-        rows = slice(None, -down or None), slice(down, None)
-        columns = (
-            (slice(None, -right or None), slice(right, None)) if right >= 0 else (slice(-right, None), slice(None, right))
-        )
+        both = [tuple(slice(max(way, 0), min(way, 0) or None) for way in (s * down, s * right)) for s in (-1, 1)]
         axis, reach = (0, down) if down else (1, right)
         for phase in range(2 * reach):
             every = tuple(slice(phase, None, 2 * reach) if k == axis else slice(None) for k in range(2))
-            ends = [[of[..., rows[k], columns[k]][..., *every] for of in (X, flat, weight)] for k in range(2)]
-            (first, here, w), (second, there, v) = ends
+            (first, here, w), (second, there, v) = (
+                [of[..., *end][..., *every] for of in (X, flat, weight)] for end in both
+            )
             share = strength / np.maximum(w + v, 1.0)
             yield Springs(first, second, norm(there - here), share * w, share * v)

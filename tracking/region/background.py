@@ -59,7 +59,8 @@ def motion(first: Array, now: Array, sectors: Flags, agreed: float) -> tuple[Arr
     band, count = told.any(axis=0), told.sum(axis=1)
     if (count >= FEWEST).sum() < AGREEING:
         return None
-    if np.median(np.linalg.norm(now - first, axis=1)[band]) < STILL_PX:
+    way = np.linalg.norm(now - first, axis=1)
+    if np.median(way[band]) < STILL_PX:
         return np.eye(3), 0.0
     H, inlier = cv2.findHomography(now[band], first[band], cv2.RANSAC, OFF_PX, maxIters=TRIALS)
     if H is None or inlier.mean() < agreed:
@@ -68,7 +69,7 @@ def motion(first: Array, now: Array, sectors: Flags, agreed: float) -> tuple[Arr
     of_it[band] = inlier[:, 0] > 0
     if ((told & of_it).sum(axis=1) >= np.maximum(0.5 * count, FEWEST)).sum() < AGREEING:
         return None
-    return np.asarray(H), float(np.median(np.linalg.norm(now - first, axis=1)[of_it]))
+    return np.asarray(H), float(np.median(way[of_it]))
 
 
 def undone(now: Array, H: Array) -> Array:

@@ -112,8 +112,8 @@ class Search:
         self._tracks.append(moved)
         way = np.linalg.norm(moved - self._tracks[0], axis=1)
         if self._far(way):  # unless it is the camera that went, and something else goes its own way
-            (first, now), _ = still([self._tracks[0], moved], self._region, MOSTLY)
-            own = np.linalg.norm(now - first, axis=1)
+            (_, now), _ = still([self._tracks[0], moved], self._region, MOSTLY)
+            own = np.linalg.norm(now - self._tracks[0], axis=1)
             way = own if np.nanmean(own > STILL_PX) > ALONE else way
         self._way = np.fmax(self._way, way)
         return True
