@@ -34,12 +34,18 @@ def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
         near = map_of(W, visible, near.camera, estimate_focal=False, kind=kind)
     if not (parallel and near and near.evidence and near.evidence.proven):  # unproven, a sheet always changes less
         return Camera()
-    return near.camera if changes(near, parallel) < CLEARLY * changes(parallel, near) else Camera()
+    before, after = changes(parallel, near)
+    return near.camera if after < CLEARLY * before else Camera()
 
 
-def changes(one: Map, other: Map) -> float:
-    """How much an object changes, comparable with another: lengths of a sheet, or what its kind leaves over, in pixels."""
-    if one.sheet and other.sheet:
-        return one.sheet.strain_rms
-    assert one.evidence
-    return (one.evidence.sheet if one.sheet else one.evidence.solid).edges_px
+def changes(parallel: Map, near: Map) -> tuple[float, float]:
+    """How much an object changes before an orthographic camera, and before one in perspective, as what the latter takes it for.
+
+    Lengths of a sheet, if it is one before both; else what that kind leaves over, px. By the orthographic camera's own kind
+    kinds would be compared, not cameras: a sheet leaves less than a solid, whatever camera sees it.
+    """
+    if parallel.sheet and near.sheet:
+        return parallel.sheet.strain_rms, near.sheet.strain_rms
+    left = [found.evidence.sheet if near.sheet else found.evidence.solid for found in (parallel, near) if found.evidence]
+    before, after = (misfit.edges_px for misfit in left)
+    return before, after
