@@ -39,10 +39,10 @@ def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
 
 
 def changes(parallel: Map, near: Map) -> tuple[float, float]:
-    """How much an object changes before an orthographic camera, and before one in perspective, as what the latter takes it for.
+    """How much an object changes before an orthographic camera, and before one in perspective.
 
-    Lengths of a sheet, if it is one before both; else what that kind leaves over, px. By the orthographic camera's own kind
-    kinds would be compared, not cameras: a sheet leaves less than a solid, whatever camera sees it.
+    Lengths of a sheet, if it is one before both; else what the kind found in perspective leaves over before either, px:
+    a sheet leaves less than a solid, whatever camera sees it.
     """
     if parallel.sheet and near.sheet:
         return parallel.sheet.strain_rms, near.sheet.strain_rms

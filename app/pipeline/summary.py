@@ -15,7 +15,7 @@ from app.terminal.summary import Summary, print_lines
 from tracking.guarded import Change, Guarded
 from tracking.sources.capture import few_bits
 
-KINDS = BY_KEYFRAMES | {"plane": "flat sheet", "mesh": "mesh given", "truth": "shape given"}
+KINDS = BY_KEYFRAMES | {"mesh": "mesh given", "truth": "shape given"}
 
 
 @dataclass

@@ -17,7 +17,7 @@ from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUND
 from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
-from reconstruction.mapping.selection import Evidence, Kind, select
+from reconstruction.mapping.selection import HARDLY_TURNED, Evidence, Kind, select
 from reconstruction.mapping.solid.deforming.deformations import Deformations
 from reconstruction.mapping.solid.deforming.freedom import modes_held
 from reconstruction.mapping.solid.solid import bundle_adjust
@@ -169,36 +169,43 @@ def map_of(
             fine = cache(lambda: refined(whole(), W, visible))
             evidence = select(W, visible, camera, lambda parts: in_parts(fine(), W, parts), start)
         made = kind or evidence.kind
-        if made == "flat" or (given is not None and made != "sheet"):
+        if given is not None and made != "sheet":
             return None
         by = W, visible
         if made == "sheet":
-            found = sheet_map(
-                W, visible, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=patient
-            )
+            found = sheet_map(*by, camera, whole(), evidence, estimate_focal=estimate_focal, given=given, last=patient)
         else:
-            by = last() if last else by
-            found = solid_map(*by, camera, evidence, estimate_focal=estimate_focal, known=known, last=patient)
+            flat = made == "flat"
+            by = last() if last and not flat else by
+            found = rigid_map(*by, camera, evidence, flat=flat, estimate_focal=estimate_focal, known=known, last=patient)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
-    focal_px = found.camera.focal_px
-    assumed = np.isclose(focal_px, camera.focal_px, rtol=1e-9)
-    source = f"{len(by[0])} keyframes" if found.sheet else f"{len(by[0])} keyframes and what is usual"
-    told = ASSUMED.format(focal_px) if assumed else f"focal length {focal_px:.0f} px, from {source}"
+    f, source = found.camera.focal_px, f"{len(by[0])} keyframes{'' if found.sheet else ' and what is usual'}"
+    told = ASSUMED.format(f) if np.isclose(f, camera.focal_px, rtol=1e-9) else f"focal length {f:.0f} px, from {source}"
     return replace(found, seen=by[1], focal_note=told if estimate_focal and camera.perspective else "")
 
 
-def solid_map(
-    W: Array, visible: Mask, camera: Camera, evidence: Evidence, *, estimate_focal: bool, known: Array | None, last: bool
+def rigid_map(
+    W: Array,
+    visible: Mask,
+    camera: Camera,
+    evidence: Evidence,
+    *,
+    flat: bool,
+    estimate_focal: bool,
+    known: Array | None,
+    last: bool,
 ) -> Map:
-    """The map of a solid.
+    """The map of a solid, or of a flat sheet.
 
     Raises:
-        ReconstructionError: there are too few points.
+        ReconstructionError: there are too few points; or it is flat and hardly turns: first frames tell as much.
     """
-    found = bundle_adjust(W, visible, camera, refine_focal=estimate_focal, known=known)
-    rest = RestShape("rigid", found.motion, f"{found.note}; {evidence.note}")
-    modes = modes_held(W, visible, found, MOST_MODES if last else MORE_MODES)
+    found = bundle_adjust(W, visible, camera, refine_focal=estimate_focal, flat=flat, known=None if flat else known)
+    if flat and found.turn_degrees < HARDLY_TURNED:
+        raise ReconstructionError(f"it turned by {found.turn_degrees:.0f}° alone")
+    rest = RestShape("plane" if flat else "rigid", found.motion, f"{found.note}; {evidence.note}")
+    modes = USUAL_MODES if flat else modes_held(W, visible, found, MOST_MODES if last else MORE_MODES)
     return Map(rest, found.camera, modes=modes, evidence=evidence)
 
 

@@ -45,7 +45,7 @@ LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be
 SURELY = 2.4  # sureness of a sheet that nothing turns: cloth that stretches has up to 2.1, rolled paper 2.7 and more
 MOSTLY = 2.4  # times what a solid leaves over a plane must, if it hardly turns: rigid ones, turned by 8°, have 2.9 and more
 RECOVERED = ("rigid", "plane")  # by the first frames
-BY_KEYFRAMES = {"isometric": "sheet", "rigid": "solid"}  # kinds of rest shapes, in words
+BY_KEYFRAMES = {"isometric": "sheet", "rigid": "solid", "plane": "flat sheet"}  # kinds of rest shapes, in words
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
 
 
@@ -172,14 +172,15 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         if found.rest.kind not in RECOVERED and found.rest.flat and not found.camera.perspective:
             yield MIRRORED
         return
-    made, says = BY_KEYFRAMES.get(found.rest.kind), found.evidence.kind
+    made = BY_KEYFRAMES.get(found.rest.kind)
+    says = "flat sheet" if found.evidence.kind == "flat" else found.evidence.kind
     if made not in (None, says):
         grade: Grade = "poor" if found.evidence.sureness > PLAIN else "fair"
-        yield Verdict(grade, f"keyframes say that it is {says if says == 'flat' else 'a ' + says}, not a {made}")
-    if found.evidence.sureness < TOSS_UP:
+        yield Verdict(grade, f"keyframes say that it is a {says}, not a {made}")
+    if found.evidence.sureness < TOSS_UP and not surely_flat(found.evidence):
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
-    if made:
+    if made and found.rest.kind != "plane":
         yield from of_turn(found, found.evidence)
     if found.rest.kind == "rigid":
         yield from of_solid(found.rest.motion, found.evidence)
@@ -188,6 +189,13 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
             yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
     if found.sheet is not None:
         yield from of_sheet(found.sheet, found.evidence, perspective=found.camera.perspective)
+
+
+def surely_flat(evidence: Evidence) -> bool:
+    """Whether it is flat, and nothing else would leave much less: a solid or sheet that leaves as much is as flat."""
+    flat, solid = evidence.flat, evidence.solid
+    edges_px = np.nanmin([solid.edges_px, evidence.sheet.edges_px])
+    return evidence.kind == "flat" and max(flat.whole_px / solid.whole_px, flat.edges_px / edges_px) < TOSS_UP
 
 
 def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
-from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.basis.rest_shape import RigidMotion, is_flat
 from reconstruction.camera import Camera
 from reconstruction.mapping.evidence import TURN_DEGREES
 from reconstruction.mapping.factorization import view_turn_degrees
@@ -123,7 +123,8 @@ def describe(W: Array, visible: Mask, bundle: Bundle, camera: Camera) -> Solid:
     motion, trusted = smoothed(visible, bundle, residual)
     turn = view_turn_degrees(motion.R)
     depth = relief(motion.shape)
-    note = f"solid from {len(W)} keyframes, turned {turn:.0f}°, median residual {np.nanmedian(residual):.2f} px"
+    kind = "flat sheet" if is_flat(motion.shape) else "solid"
+    note = f"{kind} from {len(W)} keyframes, turned {turn:.0f}°, median residual {np.nanmedian(residual):.2f} px"
     note += f", relief {depth:.2f} of the width"
     if turn < TURN_DEGREES:
         note += f" (hardly turned: relief beyond {HALF_WIDTH:g} is not believed without proof)"
