@@ -16,7 +16,8 @@ FAINT_QUALITY, FAINT_SPACINGS = 0.02, 2.0  # the same, where whatever moves is t
 # The largest response (smaller eigenvalue of the structure tensor) in a 640x480 picture of pure noise is
 # 3.4e-5 per unit of its variance; measured for deviations of 1, 3 and 10 grey levels.
 NOISE_RESPONSE = 7e-5
-NOISE_RANGE = (0.7, 12.0)  # grey levels the noise is held to: at least rounding, and fine texture is no noise
+# Grey levels the noise is held to: at least what one step of rounding in a blank part looks like; fine texture is no noise.
+NOISE_RANGE = (0.75, 12.0)
 
 
 def detect_corners(gray: Image, region: Image, max_points: int = 800, *, faint: bool = False) -> Array:

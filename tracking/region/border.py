@@ -14,6 +14,7 @@ COLOURS = 5  # that GrabCut tells on each side: so many pixels at least must be 
 STEPS = 2  # of colours learned and the picture cut
 DENSE = 1.0  # times the usual distance between points on it, around each: what is then apart from most of it is doubtful
 OUTSIDE, INSIDE = 1.0, 1.3  # the same, that the border may be from the rough one
+INSET_PX, INSET_SHARE = 7.0, 0.035  # half a Lucas-Kanade window; but no more than this of a small surface's side
 KEPT = 0.87  # of the surface's points: if fewer are left, its colours are those of what is around it
 
 
@@ -48,6 +49,17 @@ def at_colours(mask: Image, image_bgr: Image, points_px: Array) -> Image:
     if np.mean(cut[y.clip(0, len(cut) - 1), x.clip(0, cut.shape[1] - 1)] > 0) < KEPT or not sure.any():
         return mask
     return np.where(cv2.resize(sure, mask.shape[::-1], interpolation=cv2.INTER_LINEAR) > 127, 255, 0).astype(np.uint8)
+
+
+def inset(mask: Image, region: Image) -> Image:
+    """A mask (H, W) uint8 without what is so near to the rest of its region (H, W) that windows there see beyond it.
+
+    Its outline is the strongest edge there is, and what is on it slides along.
+    """
+    rest = (region > 0) & (mask == 0)
+    from_rest = cv2.distanceTransform((~rest).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    limit = min(INSET_PX, INSET_SHARE * float(np.sqrt(np.count_nonzero(mask))))
+    return np.where((mask > 0) & (from_rest > limit), 255, 0).astype(np.uint8)
 
 
 def fullest(mask: Image, points: Array) -> Flags:

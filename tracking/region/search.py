@@ -10,7 +10,7 @@ from tracking import Array, Flags, Image, TrackingError
 from tracking.features import detect_corners
 from tracking.flow import CONVERGED_PX, FEW_GUIDES, Grays, levels_of, lucas_kanade, returned
 from tracking.region.background import AGREED, STILL_PX, by_first_camera
-from tracking.region.border import at_colours
+from tracking.region.border import at_colours, inset
 from tracking.region.groups import TENTH
 from tracking.region.surface import FAR_ENOUGH, Surface, middling, surfaces
 from tracking.video import Frame
@@ -178,7 +178,8 @@ def found(tracks: list[Array], region: Image, image_bgr: Image) -> tuple[Image, 
         best = moving[0]
         left_out = ~best.own if region.all() else best.other  # nobody has chosen a picture's corners
         if float(left_out.mean()) > LEFT_OUT:
-            moving[0] = best = replace(best, mask=at_colours(best.mask, image_bgr, tracks[0][best.own]) & region)
+            mask = at_colours(best.mask, image_bgr, tracks[0][best.own]) & region
+            moving[0] = best = replace(best, mask=inset(mask, region))
             return best.mask, moving
     return region, moving
 

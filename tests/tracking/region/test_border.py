@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.tracking.scene import texture
-from tracking.region.border import at_colours
+from tracking.region.border import at_colours, inset
 
 Image = NDArray[np.uint8]
 CENTRE, RADIUS, SPACING = (150, 120), 60, 12
@@ -93,3 +93,16 @@ def test_any_mask_gives_a_mask(height: int, width: int, seed: int, kind: str, sh
     assert found.shape == mask.shape
     assert found.dtype == np.uint8
     assert set(np.unique(found)) <= {0, 255}
+
+
+def test_what_windows_at_the_border_would_see_of_the_rest_is_left_out() -> None:
+    region = np.zeros((240, 320), np.uint8)
+    region[40:200, 100:320] = 255  # a rectangle that somebody drew
+    large = region.copy()
+    large[:, :110] = 0  # the surface is all but its left end
+    left = inset(large, region)
+    assert not left[:, : 110 + 6].any()
+    assert (left[:, 110 + 8 :] == large[:, 110 + 8 :]).all()  # nothing of the rest lies beyond where it was drawn
+    small = np.asarray(disc(20) & region)
+    assert 0.75 < np.count_nonzero(inset(small, region)) / np.count_nonzero(small) < 0.95
+    assert (inset(region, region) == region).all()
