@@ -1,11 +1,17 @@
 """A camera that nobody knows is told by what it sees: solids and sheets, near and far, in any unit."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
 from reconstruction.camera import Camera
-from reconstruction.mapping.selection import Evidence
-from reconstruction.unknown_camera import likely_camera
+from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.map import map_of
+from reconstruction.mapping.selection import Evidence, Misfit
+from reconstruction.unknown_camera import changes, likely_camera
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
 
@@ -43,6 +49,22 @@ def test_what_is_not_proven_tells_no_camera(monkeypatch: pytest.MonkeyPatch) -> 
     assert likely_camera(W, everything).perspective
     monkeypatch.setattr(Evidence, "proven", False)
     assert not likely_camera(W, everything).perspective
+
+
+@pytest.mark.parametrize("kind", ["sheet", "solid"])
+def test_the_same_kind_is_compared_before_both_cameras(kind: str) -> None:
+    W, everything = solid_seen(PERSPECTIVE), np.ones((FRAMES, POINTS), bool)
+    found = map_of(W, everything, PERSPECTIVE, estimate_focal=False)
+    assert found is not None
+    assert found.evidence is not None
+    left = {"parallel": (0.24, 0.32), "near": (0.23, 0.35)}  # by a sheet, by a solid
+    parallel, near = (
+        replace(found, evidence=replace(found.evidence, sheet=Misfit(sheet, np.nan), solid=Misfit(solid, solid)))
+        for sheet, solid in left.values()
+    )
+    if kind == "sheet":
+        near = replace(near, sheet=cast(IsometricSheet, SimpleNamespace()))
+    assert changes(parallel, near) == ((0.24, 0.23) if kind == "sheet" else (0.32, 0.35))
 
 
 def test_few_frames_do_not_tell() -> None:

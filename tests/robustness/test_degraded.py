@@ -58,7 +58,7 @@ def test_bad_pictures_cost_little(made: Sample, tmp_path: Path, changes: tuple[C
     assert result.e3d.mean() <= 0.016
 
 
-@pytest.mark.slow
+@pytest.mark.whole
 def test_half_of_the_frames_is_enough(made: Sample, clean: Result, tmp_path: Path) -> None:
     video, truth = thinned(made.video, made.truth, tmp_path, 0.5)
     result = run(video, truth, made.roi, tmp_path)

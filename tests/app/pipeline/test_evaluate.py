@@ -52,15 +52,15 @@ def write_mesh(path: Path, shape: np.ndarray[tuple[int, ...], np.dtype[np.float6
     ("file", "rest", "units"),
     [
         ("flag250", "first-truth", ((MILLI, 1.0), (1.0, KILO))),
-        ("flag250_perspective", "mesh", ((KILO, MILLI),)),
+        pytest.param("flag250_perspective", "mesh", ((KILO, MILLI),), marks=SLOW),
         pytest.param("flag250_perspective", "mesh", ((MILLI, 1.0),), marks=WHOLE),
         ("face37", "rigid", ((1.0, MILLI),)),
         pytest.param("flag250", "first-truth", UNITS, marks=WHOLE),
         pytest.param("flag250_perspective", "first-truth", UNITS, marks=WHOLE),
         pytest.param("face37", "first-truth", ((KILO, MILLI),), marks=SLOW),
         pytest.param("face37", "rigid", UNITS, marks=WHOLE),
-        pytest.param("face37", "auto", ((KILO, MILLI),), marks=SLOW),
-        pytest.param("flag250", "auto", ((KILO, MILLI),), marks=SLOW),
+        pytest.param("face37", "auto", ((KILO, MILLI),), marks=WHOLE),
+        pytest.param("flag250", "auto", ((KILO, MILLI),), marks=WHOLE),
         # A regular grid has ties, which rounding decides (2e-6 in the error): powers of two have none.
         pytest.param("flag250_perspective", "auto", ((1.0, 2.0**-10),), marks=SLOW),
         pytest.param("flag250_perspective", "auto", ((1.0, 2.0**10),), marks=WHOLE),
@@ -94,11 +94,11 @@ def test_a_rest_shape_gives_the_shapes_its_units(shared_data: Path, tmp_path: Pa
 @pytest.mark.parametrize(
     ("file", "rest"),
     [
-        ("flag250_perspective", "first-truth"),
-        pytest.param("flag250", "auto", marks=SLOW),
+        pytest.param("flag250_perspective", "first-truth", marks=WHOLE),
+        pytest.param("flag250", "auto", marks=WHOLE),
         pytest.param("flag250_perspective", "auto", marks=SLOW),
         pytest.param("face37", "auto", marks=SLOW),
-        pytest.param("waving_3", "auto", marks=SLOW),
+        ("waving_3", "auto"),
     ],
 )
 def test_errors_are_as_large_as_predicted(shared_data: Path, file: str, rest: str) -> None:
@@ -109,7 +109,7 @@ def test_errors_are_as_large_as_predicted(shared_data: Path, file: str, rest: st
     assert 0.5 < score.error_over_sigma < 2
 
 
-@SLOW
+@WHOLE
 def test_tracks_without_a_camera_say_which(tmp_path: Path) -> None:
     path = tmp_path / "tracks.npz"
     W, S = waving_sheet(np.random.default_rng(5), 60)

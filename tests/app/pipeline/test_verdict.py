@@ -85,6 +85,16 @@ def test_what_may_as_well_be_something_else() -> None:
     assert "depth may be a guess" in said.reason
 
 
+@pytest.mark.parametrize(("sheet_px", "solid_px", "grade"), [(0.3, 0.3, "good"), (0.2, 0.3, "fair"), (0.3, 0.2, "fair")])
+def test_a_flat_sheet_may_as_well_be_a_solid_without_relief(sheet_px: float, solid_px: float, grade: str) -> None:
+    rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
+    solid, sheet = Misfit(solid_px, solid_px), Misfit(sheet_px, np.nan)
+    known = replace(EVIDENCE, kind="flat", flat=LEFT, solid=solid, sheet=sheet, sureness=1.05)
+    said = verdict(course([0.001] * 50), Map(rest, Camera(), evidence=known))
+    assert said.grade == grade
+    assert "a flat sheet in many views" in said.reason or grade == "fair"
+
+
 @pytest.mark.parametrize(
     ("whole_px", "edges_px", "turn_degrees", "grade"),
     [(1.5, 0.5, 60.0, "fair"), (1.5, 0.5, 5.0, "poor"), (0.5, 0.2, 60.0, "good"), (0.5, 0.2, 12.0, "fair"),

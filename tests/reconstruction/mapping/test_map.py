@@ -15,7 +15,7 @@ from reconstruction.mapping.map import Map, map_of
 from reconstruction.online import Reconstruction
 from reconstruction.settings import Settings
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
-from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, flat, relief, seen, turns
 
 FRAMES, POINTS = 24, 150
 
@@ -125,6 +125,22 @@ def test_a_solid() -> None:
     assert found.rest.kind == "rigid"
     assert e3d(found.rest.motion.shape[None], placed[:1])[0] < 0.03
     assert found.foreseen([(W[0], np.ones(120, bool))]) == [None]
+
+
+@pytest.mark.parametrize(("degrees", "told"), [(40.0, True), (8.0, False)])
+def test_a_flat_sheet_is_told_once_it_has_turned_with_its_focal_length(degrees: float, told: bool) -> None:
+    rng = np.random.default_rng(3)
+    W, placed = seen(np.repeat(flat(rng, 120)[None], 16, axis=0), turns(16, degrees), PERSPECTIVE)
+    W = W + rng.normal(0, 0.1, W.shape)
+    assumed = replace(PERSPECTIVE, focal_px=1.2 * PERSPECTIVE.focal_px)
+    found = map_of(W, np.ones((16, 120), bool), assumed, estimate_focal=True, kind=None if told else "flat")
+    assert (found is not None) == told
+    if found is not None:
+        assert found.rest.kind == "plane"
+        assert found.is_sheet
+        assert e3d(found.rest.motion.shape[None], placed[:1])[0] < 0.01
+        assert found.camera.focal_px == pytest.approx(PERSPECTIVE.focal_px, rel=0.03)
+        assert found.rest.note.startswith("flat sheet from 16 keyframes")
 
 
 @pytest.mark.parametrize("deforms", [False, True])
