@@ -194,8 +194,9 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
 def surely_flat(evidence: Evidence) -> bool:
     """Whether it is flat, and nothing else would leave much less: a solid or sheet that leaves as much is as flat."""
     flat, solid = evidence.flat, evidence.solid
-    edges_px = np.nanmin([solid.edges_px, evidence.sheet.edges_px])
-    return evidence.kind == "flat" and max(flat.whole_px / solid.whole_px, flat.edges_px / edges_px) < TOSS_UP
+    least_px = float(np.nanmin([solid.edges_px, evidence.sheet.edges_px]))
+    as_well = flat.whole_px <= TOSS_UP * solid.whole_px and flat.edges_px <= TOSS_UP * least_px
+    return evidence.kind == "flat" and as_well
 
 
 def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:
