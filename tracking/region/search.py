@@ -26,7 +26,6 @@ COMPARED = 20  # of those frames that are compared
 WINDOW_PX = 15
 WIDE_PX = 31  # leads points that do not come back: fast ones. It sees across borders, so the other has the last word
 FEWEST, POINTS = 50, 800
-LEFT_OUT = 0.03  # of the points: when no more are of something else, a region stays as it was given
 MOST_WAITED = 300  # frames, and what there is by then is taken: no more are waited for texture, or between cuts
 
 
@@ -162,7 +161,7 @@ def compared(tracks: list[Array]) -> list[Array]:
 def found(tracks: list[Array], region: Image, image_bgr: Image) -> tuple[Image, list[Surface]]:
     """What moves in a region (H, W) uint8, the best first, and the part of the region where that is.
 
-    That is the whole region, where nothing moves or hardly anything of it is of something else.
+    That is the whole region, where nothing moves or nothing of it is of something else.
 
     Args:
         tracks: of points (P, 2) px each, the first in the picture whose region it is.
@@ -177,7 +176,7 @@ def found(tracks: list[Array], region: Image, image_bgr: Image) -> tuple[Image, 
     if moving:
         best = moving[0]
         left_out = ~best.own if region.all() else best.other  # nobody has chosen a picture's corners
-        if float(left_out.mean()) > LEFT_OUT:
+        if left_out.any():
             mask = at_colours(best.mask, image_bgr, tracks[0][best.own]) & region
             moving[0] = best = replace(best, mask=inset(mask, region))
             return best.mask, moving
