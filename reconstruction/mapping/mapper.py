@@ -137,7 +137,7 @@ class Mapper:
         (W, visible, _), more = self._keyframes.spread(), cache(lambda: spread_of(frames, MORE * KEYFRAMES))
         asked = camera, self._settings.estimate_focal, self._known, self.start, self._given, self._settings.kind
         found = map_of(W, visible, *asked, last=lambda: more()[:2])
-        if found is not None and not found.is_sheet:
+        if found is not None and found.rest.kind == "rigid":
             found = with_deformations(found, self._settings, *more())
         found = found or self._found
         return found and self._begin and nearest_first(found, *self._begin)
