@@ -22,7 +22,7 @@ def outcome(clip: Clip, name: str, folder: Path) -> Result:
 @pytest.mark.parametrize(
     ("name", "losses"),
     [
-        ("light in rolling bands", 0),
+        pytest.param("light in rolling bands", 0, marks=pytest.mark.whole),
         pytest.param("background moving, region loose", 0, marks=pytest.mark.whole),
         ("background moving, region found", 0),
         pytest.param("a title card first", 0, marks=pytest.mark.whole),

@@ -52,7 +52,7 @@ def write_mesh(path: Path, shape: np.ndarray[tuple[int, ...], np.dtype[np.float6
     ("file", "rest", "units"),
     [
         ("flag250", "first-truth", ((MILLI, 1.0), (1.0, KILO))),
-        pytest.param("flag250_perspective", "mesh", ((KILO, MILLI),), marks=SLOW),
+        pytest.param("flag250_perspective", "mesh", ((KILO, MILLI),), marks=WHOLE),
         pytest.param("flag250_perspective", "mesh", ((MILLI, 1.0),), marks=WHOLE),
         ("face37", "rigid", ((1.0, MILLI),)),
         pytest.param("flag250", "first-truth", UNITS, marks=WHOLE),
