@@ -41,11 +41,13 @@ def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
 def changes(parallel: Map, near: Map) -> tuple[float, float]:
     """How much an object changes before an orthographic camera, and before one in perspective.
 
-    Lengths of a sheet, if it is one before both; else what the kind found in perspective leaves over before either, px:
-    a sheet leaves less than a solid, whatever camera sees it.
+    Lengths of a sheet, if it is one before both; else what the kind found in perspective, sheet or rigid, leaves over
+    before either, px: a sheet leaves less than a solid, whatever camera sees it.
     """
     if parallel.sheet and near.sheet:
         return parallel.sheet.strain_rms, near.sheet.strain_rms
-    left = [found.evidence.sheet if near.sheet else found.evidence.solid for found in (parallel, near) if found.evidence]
-    before, after = (misfit.edges_px for misfit in left)
-    return before, after
+    assert parallel.evidence
+    assert near.evidence
+    if near.sheet:
+        return parallel.evidence.sheet.edges_px, near.evidence.sheet.edges_px
+    return parallel.evidence.solid.edges_px, near.evidence.solid.edges_px

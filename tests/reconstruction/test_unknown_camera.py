@@ -57,10 +57,9 @@ def test_the_same_kind_is_compared_before_both_cameras(kind: str) -> None:
     found = map_of(W, everything, PERSPECTIVE, estimate_focal=False)
     assert found is not None
     assert found.evidence is not None
-    left = {"parallel": (0.24, 0.32), "near": (0.23, 0.35)}  # by a sheet, by a solid
     parallel, near = (
         replace(found, evidence=replace(found.evidence, sheet=Misfit(sheet, np.nan), solid=Misfit(solid, solid)))
-        for sheet, solid in left.values()
+        for sheet, solid in ((0.24, 0.32), (0.23, 0.35))
     )
     if kind == "sheet":
         near = replace(near, sheet=cast(IsometricSheet, SimpleNamespace()))

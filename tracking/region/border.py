@@ -1,20 +1,19 @@
 """The border of a surface in a picture: not half-way between its points and others, but where its colours end."""
 
-from typing import cast
-
 import cv2
 import numpy as np
 
-from tracking import Array, Flags, Image
+from tracking import Array, Flags, Floats, Image
 from tracking.consistency import spacing_px
-from tracking.region.surface import distance_to
+from tracking.flow import WINDOW_PX
+from tracking.region.surface import distance_from, distance_to
 
 SIDE_PX = 240  # the larger side of the picture that is cut: time grows with its area
 COLOURS = 5  # that GrabCut tells on each side: so many pixels at least must be known to be there
 STEPS = 2  # of colours learned and the picture cut
 DENSE = 1.0  # times the usual distance between points on it, around each: what is then apart from most of it is doubtful
 OUTSIDE, INSIDE = 1.0, 1.3  # the same, that the border may be from the rough one
-INSET_PX, INSET_SHARE = 7.0, 0.035  # half a Lucas-Kanade window; but no more than this of a small surface's side
+INSET_PX, INSET_SHARE = WINDOW_PX // 2, 0.035  # a window sees so far; but no more than this of a small surface's side
 KEPT = 0.87  # of the surface's points: if fewer are left, its colours are those of what is around it
 
 
@@ -56,8 +55,7 @@ def inset(mask: Image, region: Image) -> Image:
 
     Its outline is the strongest edge there is, and what is on it slides along.
     """
-    rest = (region > 0) & (mask == 0)
-    from_rest = cv2.distanceTransform((~rest).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    from_rest = distance_from((region > 0) & (mask == 0))
     limit = min(INSET_PX, INSET_SHARE * float(np.sqrt(np.count_nonzero(mask))))
     return np.where((mask > 0) & (from_rest > limit), 255, 0).astype(np.uint8)
 
@@ -69,7 +67,6 @@ def fullest(mask: Image, points: Array) -> Flags:
     return np.asarray(part == np.bincount(part[y.clip(0, len(part) - 1), x.clip(0, part.shape[1] - 1)]).argmax())
 
 
-def within(part: Flags) -> Array:
+def within(part: Flags) -> Floats:
     """How far (H, W) px each pixel of a part (H, W) is from what is not in it; beyond the picture nothing is."""
-    framed = np.pad(part, 1).astype(np.uint8)
-    return cast(Array, cv2.distanceTransform(framed, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1])
+    return distance_from(~np.pad(part, 1))[1:-1, 1:-1]

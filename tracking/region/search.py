@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking import Array, Flags, Image, TrackingError
 from tracking.features import detect_corners
-from tracking.flow import CONVERGED_PX, FEW_GUIDES, Grays, levels_of, lucas_kanade, returned
+from tracking.flow import CONVERGED_PX, FEW_GUIDES, WINDOW_PX, Grays, levels_of, lucas_kanade, returned
 from tracking.region.background import AGREED, STILL_PX, by_first_camera
 from tracking.region.border import at_colours, inset
 from tracking.region.groups import TENTH
@@ -23,7 +23,6 @@ PARALLAX = 0.15  # of how far the camera's motion takes what is behind, things n
 MOSTLY = 0.4  # of the border's points by one motion: of a room they are by several, but that is most of it
 ALONE = 0.05  # of the points go another way than the camera takes them: fewer are nothing
 COMPARED = 20  # of those frames that are compared
-WINDOW_PX = 15
 WIDE_PX = 31  # leads points that do not come back: fast ones. It sees across borders, so the other has the last word
 FEWEST, POINTS = 50, 800
 MOST_WAITED = 300  # frames, and what there is by then is taken: no more are waited for texture, or between cuts
@@ -161,7 +160,7 @@ def compared(tracks: list[Array]) -> list[Array]:
 def found(tracks: list[Array], region: Image, image_bgr: Image) -> tuple[Image, list[Surface]]:
     """What moves in a region (H, W) uint8, the best first, and the part of the region where that is.
 
-    That is the whole region, where nothing moves or nothing of it is of something else.
+    That is the whole region, where nothing moves, or all of it together.
 
     Args:
         tracks: of points (P, 2) px each, the first in the picture whose region it is.

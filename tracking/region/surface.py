@@ -208,16 +208,19 @@ def surface_mask(place: Array, own: Flags, others: Flags, region: Image) -> Imag
 
 def grown(mask: Image, radius_px: float) -> Image:
     """What is no farther than so much from a mask (H, W) of 0 and 1: takes the same time however far that is."""
-    if not mask.any():
-        return mask
-    return np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) <= np.ceil(radius_px), np.uint8)
+    return np.asarray(distance_from(mask > 0) <= np.ceil(radius_px), np.uint8)
 
 
 def distance_to(points: Array, shape: tuple[int, int]) -> Floats:
     """Distance (H, W) px of each pixel from the nearest of some points (n, 2); infinite if there are none."""
-    if len(points) == 0:
-        return np.full(shape, np.inf, np.float32)
-    free = np.full(shape, 255, np.uint8)
+    at = np.zeros(shape, np.bool_)
     x, y = np.rint(points).astype(int).T
-    free[y.clip(0, shape[0] - 1), x.clip(0, shape[1] - 1)] = 0
-    return cast(Floats, cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE))
+    at[y.clip(0, shape[0] - 1), x.clip(0, shape[1] - 1)] = True
+    return distance_from(at)
+
+
+def distance_from(part: Flags) -> Floats:
+    """Distance (H, W) px of each pixel from the nearest in a part (H, W) of the picture; infinite if that is empty."""
+    if not part.any():
+        return np.full(part.shape, np.inf, np.float32)
+    return cast(Floats, cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE))
