@@ -33,6 +33,7 @@ def test_of_a_solid(unit: float) -> None:
     assert found.focal_px == pytest.approx(unit * PERSPECTIVE.focal_px, rel=0.1)
 
 
+@pytest.mark.whole
 def test_of_a_sheet() -> None:
     rng = np.random.default_rng(5)
     W, S = waving_sheet(rng, FRAMES)

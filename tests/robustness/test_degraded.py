@@ -47,7 +47,7 @@ def clean(made: Sample, tmp_path_factory: pytest.TempPathFactory) -> Result:
 @pytest.mark.parametrize(
     "changes",
     [
-        pytest.param((flickering(0.4), blurred(8)), id="light and blur"),
+        pytest.param((flickering(0.4), blurred(8)), id="light and blur", marks=pytest.mark.whole),
         pytest.param((noisy(10), compressed(30)), id="noise and jpeg", marks=pytest.mark.whole),
     ],
 )

@@ -97,7 +97,7 @@ def test_a_rest_shape_gives_the_shapes_its_units(shared_data: Path, tmp_path: Pa
         pytest.param("flag250_perspective", "first-truth", marks=WHOLE),
         pytest.param("flag250", "auto", marks=WHOLE),
         pytest.param("flag250_perspective", "auto", marks=SLOW),
-        pytest.param("face37", "auto", marks=SLOW),
+        pytest.param("face37", "auto", marks=WHOLE),
         ("waving_3", "auto"),
     ],
 )
@@ -163,7 +163,7 @@ def test_tracks_of_which_nearly_all_is_hidden_are_refused(tmp_path: Path) -> Non
         evaluate(Evaluate(tmp_path / "tracks.npz", missing=0.99), Progress())
 
 
-@pytest.mark.parametrize("unseen", [slice(5, 6), slice(0, 15)])
+@pytest.mark.parametrize("unseen", [slice(5, 6), pytest.param(slice(0, 15), marks=WHOLE)])
 def test_frames_that_show_nothing_do_not_stop_a_run(tmp_path: Path, unseen: slice) -> None:
     W, _ = swelling_hill()
     visible = np.ones((len(W), W.shape[2]), bool)
