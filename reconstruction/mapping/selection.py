@@ -41,7 +41,8 @@ SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
 LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
 SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave so many times less than anything rigid, ...
 STRETCH_FREEDOM = 150.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane,
-MOST_FREEDOM = 3.5  # ... no more: cloth in the wind leaves a fifth of what anything rigid does, what deforms a half
+# ... no more where the solid turns by less than 45°, or else: flags leave up to half of it, faces 0.6, jaws, turned by 51°, half
+FEW_SIDES_DEG, MOST_FREEDOM = 45.0, (1.85, 3.5)
 # A solid that turns less is not proven, unless its relief explains so many times what neighbours share of what it leaves
 # over, in squares: what deforms seems to turn, too.
 HARDLY_TURNED, EXPLAINED = 25.0, 5.0
@@ -104,12 +105,10 @@ class Evidence(Rigid):
     def note(self) -> str:
         """In words, for the log."""
         kinds = {"flat": self.flat, "solid": self.solid, "sheet": self.sheet}
-        left = (
-            ", ".join(f"{kind} {left.edges_px:.2f}" for kind, left in kinds.items() if not np.isnan(left.edges_px)) + " px"
-        )
+        left = ", ".join(f"{kind} {left.edges_px:.2f}" for kind, left in kinds.items() if not np.isnan(left.edges_px))
         lengths = "" if np.isnan(self.length_change) else f"; lengths change by {self.length_change:.1%}"
         solid = f"turn {self.turn_degrees:.0f}°, relief {self.relief:.2f}"
-        return f"{self.kind}: left over on other keyframes {left}{lengths}; {solid}"
+        return f"{self.kind}: left over on other keyframes {left} px{lengths}; {solid}"
 
 
 def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = None, start: Start = at_once) -> Evidence:
@@ -167,7 +166,8 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     if not rigid.proven:  # all of its stretching speaks against a sheet, too
         rigid_px, least, explained = min(flat.whole_px, solid.whole_px), 1.0, 1.0
     better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
-    if (freedom := min(least + STRETCH_FREEDOM * stretch * explained, MOST_FREEDOM)) * better < 1:
+    most = MOST_FREEDOM[rigid.turn_degrees >= FEW_SIDES_DEG]
+    if (freedom := min(least + STRETCH_FREEDOM * stretch * explained, most)) * better < 1:
         return "sheet", float(1 / (freedom * better))
     return best, float(min(max(gain, 1 / gain), least * better))
 

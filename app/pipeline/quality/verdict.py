@@ -32,9 +32,6 @@ FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
 POOR_LENGTHS = 0.07  # change of them from half to half of the keyframes: sheets have up to 4.5 %, things with limbs 8 %
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
-# A solid by what a sheet's lengths did, not by what it leaves over, and seen from few sides: flags whose folds are cut off
-# are 50 to 70 % off. Faces that talk have 0.7 and more, heads that chew 0.5, turned by 51°.
-UNSURE, FEW_SIDES_DEG = 0.65, 45.0
 # What a rigid shape leaves over and neighbours share, which is no noise, over its radius and the sine of its turn: as much
 # its depth may be off, and more.
 FAIR_DEPTH = 0.0125
@@ -220,9 +217,6 @@ def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
     if depth > FAIR_DEPTH or whole > FAIR_CHANGE:
         told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
         yield Verdict("poor" if whole > POOR_CHANGE else "fair", f"{told}; film it turning more")
-    if evidence.sureness < UNSURE and turn < FEW_SIDES_DEG:
-        told = f"a sheet would leave {1 / evidence.sureness:.1f} times less over, and it turns by {turn:.0f}° alone"
-        yield Verdict("poor", f"{told}: it may be no solid; film it turning more; if it is a sheet: --rest-shape sheet")
     deep, half = relief(motion.shape), evidence.relief
     if max(deep, half) > OTHERWISE_DEEP * min(deep, half):
         told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"

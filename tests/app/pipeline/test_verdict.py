@@ -111,16 +111,6 @@ def test_the_depth_of_a_solid_that_changes(whole_px: float, edges_px: float, tur
         assert ("how deep it is is a guess" in said.reason) == (grade != "good")
 
 
-@pytest.mark.parametrize(
-    ("sureness", "turn_degrees", "grade"), [(0.5, 30.0, "poor"), (0.5, 60.0, "fair"), (0.9, 30.0, "fair")]
-)
-def test_a_solid_that_may_be_a_flag_s_folds(sureness: float, turn_degrees: float, grade: str) -> None:
-    seen = replace(EVIDENCE, sureness=sureness, turn_degrees=turn_degrees)
-    said = verdict(course([0.001] * 50), replace(SOLID, evidence=seen))
-    assert said.grade == grade
-    assert ("--rest-shape sheet" in said.reason) == (grade == "poor")
-
-
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_a_solid_that_half_of_the_keyframes_find_otherwise_deep(factor: float) -> None:
     half = replace(EVIDENCE, relief=factor * EVIDENCE.relief)
