@@ -41,7 +41,7 @@ SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
 LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
 SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave so many times less than anything rigid, ...
 STRETCH_FREEDOM = 150.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane,
-# ... no more where the solid turns by less than 45°, or else: flags leave up to half of it, faces 0.6, jaws, turned by 51°, half
+# ... no more where the solid turns by less than 45°, or else: flags leave up to half of it, faces 0.6, jaws (51°) half
 FEW_SIDES_DEG, MOST_FREEDOM = 45.0, (1.85, 3.5)
 # A solid that turns less is not proven, unless its relief explains so many times what neighbours share of what it leaves
 # over, in squares: what deforms seems to turn, too.
