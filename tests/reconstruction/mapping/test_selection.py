@@ -89,6 +89,7 @@ def test_what_leaves_least_wins_and_freedom_costs(unit):
     assert decided((15, 60), (4, 8), 1.0, stretch=0.025, turn=60.0) == "sheet"  # a flag in the wind
     assert decided((5, 10), (1.5, 3), 0.65, stretch=0.025) == "sheet"  # one whose folds are cut off
     assert decided((5, 10), (1.5, 3), 0.65, stretch=0.025, turn=60.0) == "solid"  # a jaw
+    assert decided((1, 2), (0.9, 1.3), 0.65, stretch=0.025, turn=8.0) == "solid"  # a face that talks and hardly turns
     assert decided((0.5, 0.8), (0.4, 0.6), 0.4, turn=5.0) == "sheet"  # a curtain that moves a little
     assert decided((0.5, 0.8), (0.4, 0.6), 0.4, turn=30.0) == "solid"
     assert decided((0.4, 0.7), (0.3, 0.28), 0.34, turn=5.0) == "solid"  # a can that hardly turns
