@@ -24,7 +24,7 @@ def evaluated(given: Tracks, folder: Path) -> Evaluation:
 
 @pytest.mark.parametrize(
     ("kind", "found", "bound"),
-    [("head", "rigid", 0.01), ("rolling", "isometric", 0.035)],
+    [("head", "rigid", 0.005), ("rolling", "isometric", 0.0125)],
 )
 def test_made_up_things_with_gaps_noise_and_gross_errors(tmp_path: Path, kind: str, found: str, bound: float) -> None:
     outcome = evaluated(tracks(scene(kind, 1), SEVERE), tmp_path)
@@ -53,4 +53,4 @@ def test_a_waving_sheet_with_gaps_noise_and_gross_errors(shared_data: Path, tmp_
     outcome = evaluated(damaged(Tracks.load(shared_data / "waving_5.npz"), SEVERE, np.random.default_rng(seed)), tmp_path)
     assert outcome.rest_shape == "isometric"
     assert outcome.score is not None
-    assert outcome.score.e3d <= 0.0285  # 0.015 without any of it
+    assert outcome.score.e3d <= 0.015  # ten seeds 0.0105 to 0.0133; 0.0052 without any of it
