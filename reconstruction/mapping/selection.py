@@ -42,7 +42,7 @@ LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a be
 SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave so many times less than anything rigid, ...
 STRETCH_FREEDOM = 150.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane,
 # ... no more where a proven solid turns by less than 45°, or else: flags leave up to half of it, faces 0.6, jaws (51°) half
-FEW_SIDES_DEG, MOST_FREEDOM = 45.0, (1.85, 3.5)
+FEW_SIDES_DEG, FEW_SIDES_FREEDOM, MOST_FREEDOM = 45.0, 1.85, 3.5
 # A solid that turns less is not proven, unless its relief explains so many times what neighbours share of what it leaves
 # over, in squares: what deforms seems to turn, too.
 HARDLY_TURNED, EXPLAINED = 25.0, 5.0
@@ -166,7 +166,7 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     if not rigid.proven:  # all of its stretching speaks against a sheet, too
         rigid_px, least, explained = min(flat.whole_px, solid.whole_px), 1.0, 1.0
     better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
-    most = MOST_FREEDOM[rigid.turn_degrees >= FEW_SIDES_DEG or not rigid.proven]
+    most = FEW_SIDES_FREEDOM if rigid.proven and rigid.turn_degrees < FEW_SIDES_DEG else MOST_FREEDOM
     if (freedom := min(least + STRETCH_FREEDOM * stretch * explained, most)) * better < 1:
         return "sheet", float(1 / (freedom * better))
     return best, float(min(max(gain, 1 / gain), least * better))
