@@ -95,6 +95,7 @@ def test_real_data_stand_beside_peers(shared_data: Path, tmp_path: Path) -> None
     assert (tmp_path / "out" / "footage" / "modes-flag250.jpg").stat().st_size > 10_000
 
 
+@pytest.mark.whole
 def test_a_video_becomes_a_strip_and_a_chart(shared_data: Path, tmp_path: Path) -> None:
     reproduced = reproduce(Reproduce(shared_data, tmp_path / "out", only=("paper",), quick=True), Progress())
     experiments = reproduced.experiments

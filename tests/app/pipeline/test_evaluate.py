@@ -96,7 +96,7 @@ def test_a_rest_shape_gives_the_shapes_its_units(shared_data: Path, tmp_path: Pa
     [
         pytest.param("flag250_perspective", "first-truth", marks=WHOLE),
         pytest.param("flag250", "auto", marks=WHOLE),
-        pytest.param("flag250_perspective", "auto", marks=SLOW),
+        pytest.param("flag250_perspective", "auto", marks=WHOLE),
         pytest.param("face37", "auto", marks=WHOLE),
         ("waving_3", "auto"),
     ],
