@@ -163,10 +163,10 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     best: Kind = "solid" if gain > 1 and rigid.relief > LEAST_RELIEF else "flat"
     rigid_px, least = solid.edges_px if best == "solid" else min(flat.edges_px, solid.edges_px), SHEET_FREEDOM
     explained = max(0.0, 1 - (solid.edges_px / max(flat.edges_px, 1e-300)) ** 2)  # by relief, of what a plane leaves
+    most = FEW_SIDES_FREEDOM if rigid.turn_degrees < FEW_SIDES_DEG else MOST_FREEDOM
     if not rigid.proven:  # all of its stretching speaks against a sheet, too
-        rigid_px, least, explained = min(flat.whole_px, solid.whole_px), 1.0, 1.0
+        rigid_px, least, explained, most = min(flat.whole_px, solid.whole_px), 1.0, 1.0, MOST_FREEDOM
     better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
-    most = FEW_SIDES_FREEDOM if rigid.proven and rigid.turn_degrees < FEW_SIDES_DEG else MOST_FREEDOM
     if (freedom := min(least + STRETCH_FREEDOM * stretch * explained, most)) * better < 1:
         return "sheet", float(1 / (freedom * better))
     return best, float(min(max(gain, 1 / gain), least * better))

@@ -86,7 +86,8 @@ def test_what_leaves_least_wins_and_freedom_costs(unit):
     assert decided((1, 2), (0.5, 1), np.nan) == "solid"
     assert decided((2, 4), (0.7, 2), 0.4, stretch=0.015) == "solid"  # a face that talks
     assert decided((1, 2), (0.95, 1.9), 0.4, stretch=0.015) == "sheet"  # cloth
-    assert decided((15, 60), (4, 8), 1.0, stretch=0.025, turn=60.0) == "sheet"  # a flag in the wind
+    assert decided((15, 60), (4, 8), 1.0, stretch=0.025) == "sheet"  # a flag in the wind
+    assert decided((15, 60), (4, 8), 1.0, stretch=0.025, turn=60.0) == "sheet"
     assert decided((5, 10), (1.5, 3), 0.65, stretch=0.025) == "sheet"  # one whose folds are cut off
     assert decided((5, 10), (1.5, 3), 0.65, stretch=0.025, turn=60.0) == "solid"  # a jaw
     assert decided((1, 2), (0.9, 1.3), 0.65, stretch=0.025, turn=8.0) == "solid"  # a face that talks and hardly turns
