@@ -6,7 +6,7 @@ import numpy as np
 
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
-from reconstruction.basis.rest_shape import RigidMotion, is_flat
+from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.evidence import TURN_DEGREES
 from reconstruction.mapping.factorization import view_turn_degrees
@@ -102,7 +102,7 @@ def bundle_adjust(
     motion = bundle[back].motion.in_first_frame()
     motion = replace(motion, shape=with_unseen(motion.shape, np.asarray(visible.any(axis=0)), known))
     bundle = Bundle(motion, bundle.kappa)
-    return describe(W, given, bundle, camera)
+    return describe(W, given, bundle, camera, flat=flat)
 
 
 def width(shape: Array) -> float:
@@ -116,14 +116,14 @@ def relief(shape: Array) -> float:
     return float(np.sqrt(np.linalg.eigvalsh(np.cov(shape, bias=True))[0].clip(0))) / width(shape)
 
 
-def describe(W: Array, visible: Mask, bundle: Bundle, camera: Camera) -> Solid:
+def describe(W: Array, visible: Mask, bundle: Bundle, camera: Camera, *, flat: bool) -> Solid:
     """The solid of a bundle in pixels, its spikes smoothed; W and bundle relative to the principal point."""
     residual = np.where(visible, np.linalg.norm(bundle.image() - W, axis=1), np.nan)
     focal = 1 / bundle.kappa if bundle.kappa else np.inf
     motion, trusted = smoothed(visible, bundle, residual)
     turn = view_turn_degrees(motion.R)
     depth = relief(motion.shape)
-    kind = "flat sheet" if is_flat(motion.shape) else "solid"
+    kind = "flat sheet" if flat else "solid"
     note = f"{kind} from {len(W)} keyframes, turned {turn:.0f}°, median residual {np.nanmedian(residual):.2f} px"
     note += f", relief {depth:.2f} of the width"
     if turn < TURN_DEGREES:
