@@ -13,13 +13,14 @@ from reconstruction.basis.mesh import Mesh, ratio_of_sizes
 from reconstruction.basis.model import Model, build_model
 from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, medoid
 from reconstruction.camera import Camera, lens, nearest_rotation
-from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, in_parts, refined, sheet
+from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, in_halves, refined, sheet
 from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
-from reconstruction.mapping.selection import HARDLY_TURNED, Evidence, Kind, select
+from reconstruction.mapping.selection import Evidence, Kind, select
 from reconstruction.mapping.solid.deforming.deformations import Deformations
 from reconstruction.mapping.solid.deforming.freedom import modes_held
+from reconstruction.mapping.solid.rivals import HARDLY_TURNED
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES, Settings
@@ -164,10 +165,10 @@ def map_of(
     try:
         seen_by = camera if camera.perspective else lens(W, LONG_LENS)
         whole, patient = cache(lambda: sheet(W, visible, seen_by)), last is not None
-        evidence = select(W, visible, camera, lambda parts: in_parts(whole(), W, parts), start)
+        evidence = select(W, visible, camera, lambda halves: in_halves(whole(), W, halves), start)
         if patient and camera.perspective and evidence.sureness < 1:  # but for its stretch a sheet: bends may be cut off
             fine = cache(lambda: refined(whole(), W, visible))
-            evidence = select(W, visible, camera, lambda parts: in_parts(fine(), W, parts), start)
+            evidence = select(W, visible, camera, lambda halves: in_halves(fine(), W, halves), start)
         made = kind or evidence.kind
         if given is not None and made != "sheet":
             return None

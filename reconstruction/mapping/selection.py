@@ -5,7 +5,8 @@ Each is made from one half of the keyframes and seen by the other, over edges (i
     flat, solid   ‖(u_i − w_i) − (u_j − w_j)‖/√2 of a rigid shape's image u and the observation w, poses fitted
     sheet         |log l_ij − its median where it was made| ‖w_i − w_j‖/√2, l lengths of shapes that keep them if they can
 
-so that each is the noise of the tracks in pixels where the hypothesis is true.
+so that each is the noise of the tracks in pixels where the hypothesis is true. A sheet is tested twice: where each half
+finds lengths by itself, which few views may leave open, and where one is told those of the other.
 """
 
 from collections.abc import Callable
@@ -22,15 +23,14 @@ from reconstruction.basis.mesh import farthest_points
 from reconstruction.camera import Camera
 from reconstruction.mapping.outliers import medians
 from reconstruction.mapping.solid.placing import FEWEST_VIEWS
-from reconstruction.mapping.solid.seen_again import image_in
-from reconstruction.mapping.solid.solid import Solid, bundle_adjust
+from reconstruction.mapping.solid.rivals import Misfit, Rigid, both, rigid_by, rms
 from reconstruction.mapping.start import Start, at_once
 
 Kind = Literal["flat", "solid", "sheet"]
-Surface = Callable[[list[Indices]], tuple[list[tuple[Array, Array]], float]]
-"""Shapes (n, 3, p) of a sheet for each of several parts of the keyframes: smooth, and through the points as seen.
+Surface = Callable[[tuple[Indices, Indices]], tuple[list[tuple[Array, Array, Array]], float]]
+"""Shapes (n, 3, p) of a sheet for both halves of the keyframes: smooth, through the points as seen, and so told lengths.
 
-And by how much lengths change in all of them, rms, noise apart.
+Those are the other half's. And by how much lengths change in all of them, rms, noise apart.
 """
 
 COMPARED = 80  # points
@@ -43,46 +43,11 @@ SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave s
 STRETCH_FREEDOM = 150.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane,
 # ... no more where a proven solid turns by less than 45°, or else: flags leave up to half of it, faces 0.6, jaws (51°) half
 FEW_SIDES_DEG, FEW_SIDES_FREEDOM, MOST_FREEDOM = 45.0, 1.85, 3.5
-# A solid that turns less is not proven, unless its relief explains so many times what neighbours share of what it leaves
-# over, in squares: what deforms seems to turn, too.
-HARDLY_TURNED, EXPLAINED = 25.0, 5.0
+# ... or, told lengths, so many times the share by which it stretches whatever it is: depths are free, and leave of faces
+# 0.35 to 0.8 of it, stretching by 1.4 % and more, of paper 0.1 to 0.25, by 0.3 %
+TOLD_FREEDOM = 250.0
 PLAIN = 2.0  # sureness that leaves no doubt: one half of the keyframes is enough to test rigid shapes by
-SIGMAS = 1.1774  # median of a Rayleigh distribution
 HALF_NORMAL = 0.6745  # median of a half-normal one
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """What a hypothesis leaves over on keyframes that it was not made from; deviation in one coordinate.
-
-    Attributes:
-        edges_px: of a point against its neighbours.
-        whole_px: of a point against the whole; NaN for a sheet, which goes through every point.
-    """
-
-    edges_px: float
-    whole_px: float
-
-
-@dataclass(frozen=True)
-class Rigid:
-    """What a plane and a solid leave over, and the solid's turn and relief.
-
-    Attributes:
-        flat, solid: what each leaves over.
-        turn_degrees, relief: of the solid.
-    """
-
-    flat: Misfit
-    solid: Misfit
-    turn_degrees: float
-    relief: float
-
-    @property
-    def proven(self) -> bool:
-        """Whether the solid turns so far, or explains so much, that its depth is no guess."""
-        left, shared = self.solid.whole_px**2, self.solid.whole_px**2 - self.solid.edges_px**2
-        return self.turn_degrees >= HARDLY_TURNED or self.flat.whole_px**2 - left > EXPLAINED * max(shared, 0.0)
 
 
 @dataclass(frozen=True)
@@ -94,18 +59,21 @@ class Evidence(Rigid):
         sheet: what it leaves over; NaN where none was to be had.
         length_change: change of the sheet's edge lengths between the halves of the keyframes; a robust deviation, relative.
         sureness: by what factor the next best hypothesis leaves more, freedom reckoned with; 1 is a toss-up.
+        told_px: what the sheet leaves over of frames that are told its lengths, px of an edge.
     """
 
     kind: Kind
     sheet: Misfit
     length_change: float
     sureness: float
+    told_px: float = np.nan
 
     @property
     def note(self) -> str:
         """In words, for the log."""
         kinds = {"flat": self.flat, "solid": self.solid, "sheet": self.sheet}
         left = ", ".join(f"{kind} {left.edges_px:.2f}" for kind, left in kinds.items() if not np.isnan(left.edges_px))
+        left += "" if np.isnan(self.told_px) else f" (told its lengths {self.told_px:.2f})"
         lengths = "" if np.isnan(self.length_change) else f"; lengths change by {self.length_change:.1%}"
         solid = f"turn {self.turn_degrees:.0f}°, relief {self.relief:.2f}"
         return f"{self.kind}: left over on other keyframes {left} px{lengths}; {solid}"
@@ -126,7 +94,7 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     """
     if len(W) < 2 * FEWEST_VIEWS:
         raise ReconstructionError(f"{2 * FEWEST_VIEWS} keyframes are needed to tell what the object is, not {len(W)}")
-    halves = [np.arange(k, len(W), 2) for k in (0, 1)]
+    halves = np.arange(0, len(W), 2), np.arange(1, len(W), 2)
     seen = [(W[half], visible[half]) for half in halves]
     points = spread_points(W, visible)
     edges = spread_edges(W, visible, points[:COMPARED])
@@ -135,19 +103,21 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     at = np.searchsorted(few, edges)
     begun = start(rigid_by, views[0], views[1], camera, at)
     sheet, change, stretch = Misfit(np.nan, np.nan), np.nan, 0.0
+    told_px = np.nan
     if surface is not None:
         with suppress(ReconstructionError):  # no sheet, then
             shapes, stretch = surface(halves)
-            sheet, change = sheet_misfit(shapes, seen, edges)
+            sheet, change = sheet_misfit([(made, through) for made, through, _ in shapes], seen, edges)
+            told_px = sheet_misfit([(made, told) for made, _, told in shapes], seen, edges)[0].edges_px
     rigid: Rigid = begun.result()
-    kind, sureness = decide(rigid, sheet, stretch)
+    kind, sureness = decide(rigid, sheet, stretch, told_px)
     if sureness < PLAIN:
         rigid = both(rigid, rigid_by(views[1], views[0], camera, at))
-        kind, sureness = decide(rigid, sheet, stretch)
-    return Evidence(rigid.flat, rigid.solid, rigid.turn_degrees, rigid.relief, kind, sheet, change, sureness)
+        kind, sureness = decide(rigid, sheet, stretch, told_px)
+    return Evidence(rigid.flat, rigid.solid, rigid.turn_degrees, rigid.relief, kind, sheet, change, sureness, told_px)
 
 
-def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
+def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan) -> tuple[Kind, float]:
     """The kind, and how many times more the next best leaves.
 
     Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges, if they are proven. Cloth
@@ -157,6 +127,7 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
         rigid: what rigid shapes leave over.
         sheet: what a sheet does.
         stretch: change of its lengths, rms, noise apart.
+        told_px: what it leaves over of frames that are told its lengths.
     """
     flat, solid = rigid.flat, rigid.solid
     gain = max(flat.whole_px, 1e-300) / max(SOLID_FREEDOM * solid.whole_px, 1e-300)
@@ -166,35 +137,13 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float) -> tuple[Kind, float]:
     most = FEW_SIDES_FREEDOM if rigid.turn_degrees < FEW_SIDES_DEG else MOST_FREEDOM
     if not rigid.proven:  # all of its stretching speaks against a sheet, too
         rigid_px, least, explained, most = min(flat.whole_px, solid.whole_px), 1.0, 1.0, MOST_FREEDOM
-    better = np.inf if np.isnan(sheet.edges_px) else max(sheet.edges_px, 1e-300) / max(rigid_px, 1e-300)
-    if (freedom := min(least + STRETCH_FREEDOM * stretch * explained, most)) * better < 1:
-        return "sheet", float(1 / (freedom * better))
-    return best, float(min(max(gain, 1 / gain), least * better))
-
-
-def rigid_by(made: tuple[Array, Mask], tested: tuple[Array, Mask], camera: Camera, edges: Indices) -> Rigid:
-    """A plane and a solid made from some keyframes, on others."""
-    solid, flat = (bundle_adjust(*made, camera, refine_focal=False, flat=flat) for flat in (False, True))
-    left = [rigid_misfit(model, *tested, camera, edges) for model in (flat, solid)]
-    return Rigid(left[0], left[1], solid.turn_degrees, solid.relief)
-
-
-def rigid_misfit(model: Solid, W: Array, visible: Mask, camera: Camera, edges: Indices) -> Misfit:
-    """Of a rigid shape on keyframes that it was not made from."""
-    i, j = edges.T
-    off = np.where(visible[:, None], image_in(model, W, visible, camera) - W, 0.0)
-    seen = visible[:, i] & visible[:, j]
-    between = np.median(np.linalg.norm(off[:, :, i] - off[:, :, j], axis=1)[seen]) / SIGMAS / np.sqrt(2)
-    return Misfit(float(between), float(np.median(np.linalg.norm(off, axis=1)[visible]) / SIGMAS))
-
-
-def both(one: Rigid, other: Rigid) -> Rigid:
-    """What was found on two halves of the keyframes, together."""
-    flat, solid = (
-        Misfit(rms([a.edges_px, b.edges_px]), rms([a.whole_px, b.whole_px]))
-        for a, b in ((one.flat, other.flat), (one.solid, other.solid))
-    )
-    return Rigid(flat, solid, (one.turn_degrees + other.turn_degrees) / 2, (one.relief + other.relief) / 2)
+    freedom = min(least + STRETCH_FREEDOM * stretch * explained, most)
+    alone, told = (max(np.nan_to_num(px, nan=np.inf), 1e-300) for px in (sheet.edges_px, told_px))
+    stiff_px = min(flat.edges_px, solid.edges_px)
+    sureness = max(rigid_px / (freedom * alone), stiff_px / ((SHEET_FREEDOM + TOLD_FREEDOM * stretch) * told))
+    if sureness > 1:
+        return "sheet", float(sureness)
+    return best, float(min(max(gain, 1 / gain), least * alone / max(rigid_px, 1e-300)))
 
 
 def sheet_misfit(shapes: list[tuple[Array, Array]], seen: list[tuple[Array, Mask]], edges: Indices) -> tuple[Misfit, float]:
@@ -243,8 +192,3 @@ def spread_edges(W: Array, visible: Mask, points: Indices) -> Indices:
     i = np.repeat(np.arange(len(few)), near.shape[1])
     pairs = np.sort(np.stack([i, near.ravel()], axis=1), axis=1)
     return np.asarray(few[np.unique(pairs[pairs[:, 0] < pairs[:, 1]], axis=0)])
-
-
-def rms(values: list[float]) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -10,7 +10,8 @@ import pytest
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import map_of
-from reconstruction.mapping.selection import Evidence, Misfit
+from reconstruction.mapping.selection import Evidence
+from reconstruction.mapping.solid.rivals import Misfit
 from reconstruction.unknown_camera import changes, likely_camera
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns

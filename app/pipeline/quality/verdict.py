@@ -15,7 +15,8 @@ from app.pipeline.quality.course import Course
 from reconstruction.basis.rest_shape import RigidMotion, rms_radius
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
-from reconstruction.mapping.selection import HARDLY_TURNED, PLAIN, Evidence
+from reconstruction.mapping.selection import PLAIN, Evidence
+from reconstruction.mapping.solid.rivals import HARDLY_TURNED
 from reconstruction.mapping.solid.solid import relief
 
 Grade = Literal["good", "fair", "poor"]

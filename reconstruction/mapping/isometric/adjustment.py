@@ -20,6 +20,7 @@ from reconstruction.mapping.isometric.lengths import (
     Solver,
     adjust_depths,
     best_start,
+    finish_depths,
     mean_log_lengths,
     robust_lengths,
     usual,
@@ -109,9 +110,14 @@ def by_part(found: IsometricSheet, part: Indices) -> IsometricSheet:
     return described(warps, nodes, found.field, found.values, c, factor, found.camera, found.bend, functions)
 
 
-def in_parts(found: IsometricSheet, W: Array, parts: list[Indices]) -> tuple[list[tuple[Array, Array]], float]:
-    """Shapes of the sheet for each of several parts of its keyframes W (F, 2, p) px, as model selection asks for them."""
-    return [by_part(found, part).both(W[part]) for part in parts], found.strain_beyond_noise
+def in_halves(found: IsometricSheet, W: Array, halves: Sequence[Indices]) -> tuple[list[tuple[Array, Array, Array]], float]:
+    """Shapes of the sheet for both halves of its keyframes W (F, 2, p) px, as model selection asks for them."""
+    made = [by_part(found, half) for half in halves]
+    shapes = []
+    for one, other, half in zip(made, reversed(made), halves, strict=True):
+        told = finish_depths(one.edges, other.log_lengths, one.coefficients, one.field.stiffness, one.bend)[0]
+        shapes.append((*one.both(W[half]), one.along_rays(told, W[half])))
+    return shapes, found.strain_beyond_noise
 
 
 def refined(found: IsometricSheet, W: Array, visible: Mask) -> IsometricSheet:

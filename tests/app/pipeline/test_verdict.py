@@ -13,8 +13,9 @@ from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.selection import Evidence, Misfit
+from reconstruction.mapping.selection import Evidence
 from reconstruction.mapping.solid.deforming.deformations import Deformations
+from reconstruction.mapping.solid.rivals import Misfit
 from reconstruction.mapping.solid.solid import relief
 
 REST = RestShape("rigid", RigidMotion(100 * np.tile(np.eye(3, 9), 3), np.eye(3)[None], np.ones(1), np.zeros((1, 2))), "")

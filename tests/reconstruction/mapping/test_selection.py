@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
-from reconstruction.mapping.selection import Misfit, Rigid, decide, select, spread_edges, spread_points
+from reconstruction.mapping.selection import decide, select, spread_edges, spread_points
+from reconstruction.mapping.solid.rivals import Misfit, Rigid
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, SEEDS, flat, relief, rolled, seen, turns
 
 K, P = 16, 100
@@ -19,10 +20,8 @@ def keyframes(rng, shapes, camera=PERSPECTIVE, degrees=25.0, noise=0.2):
 
 def surface_of(placed, rng, off=0.3):
     """What a good maker of sheets would find, of one that does not stretch; seen `off` px beside it."""
-    return lambda parts: (
-        [(placed[part], placed[part] + off * rng.normal(size=(len(part), 3, P))) for part in parts],
-        0.0,
-    )
+    through = placed + off * rng.normal(size=placed.shape)
+    return lambda halves: ([(placed[half], through[half], through[half]) for half in halves], 0.0)
 
 
 @given(SEEDS)
@@ -94,6 +93,16 @@ def test_what_leaves_least_wins_and_freedom_costs(unit):
     assert decided((0.5, 0.8), (0.4, 0.6), 0.4, turn=5.0) == "sheet"  # a curtain that moves a little
     assert decided((0.5, 0.8), (0.4, 0.6), 0.4, turn=30.0) == "solid"
     assert decided((0.4, 0.7), (0.3, 0.28), 0.34, turn=5.0) == "solid"  # a can that hardly turns
+
+
+def test_frames_that_can_be_told_lengths_show_a_sheet():
+    def decided(solid, told_px, stretch):
+        return decide(Rigid(Misfit(0.72, 1.47), solid, 28.0, 0.3), Misfit(0.43, np.nan), stretch, told_px)[0]
+
+    assert decided(Misfit(0.49, 0.98), 0.09, 0.003) == "sheet"  # paper, whose halves by themselves find other lengths
+    assert decided(Misfit(0.49, 0.98), np.nan, 0.003) == "solid"
+    assert decided(Misfit(0.49, 0.98), 0.2, 0.018) == "solid"  # a face: where nothing lasts, depths always do
+    assert decided(Misfit(0.20, 0.20), 0.2, 0.003) == "solid"  # a box, explained up to its noise
 
 
 def test_a_kind_that_only_the_freedom_of_another_decides_is_in_doubt():

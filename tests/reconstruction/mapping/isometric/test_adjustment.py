@@ -9,7 +9,7 @@ import pytest
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
-from reconstruction.mapping.isometric.adjustment import bundled, sheet
+from reconstruction.mapping.isometric.adjustment import bundled, in_halves, sheet
 from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.one_frame import shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
@@ -48,6 +48,17 @@ def test_lengths_are_those_of_the_sheet() -> None:
     true = np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)).mean(axis=0)
     ratio = found.log_lengths - true
     assert np.std(ratio - np.median(ratio)) < 0.05
+
+
+def test_a_half_of_the_keyframes_can_be_told_the_lengths_of_the_other() -> None:
+    W, _, found = waving()
+    halves = np.arange(0, len(W), 2), np.arange(1, len(W), 2)
+    shapes, _ = in_halves(found, W, halves)
+    i, j = found.nodes.points[found.nodes.ends].T
+    for (_, through, told), (made, _, _), half in zip(shapes, shapes[::-1], halves, strict=True):
+        alone, by_them, theirs = (np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)) for S in (through, told, made))
+        assert np.std(by_them - np.median(theirs, axis=0)) < np.std(alone - np.median(theirs, axis=0))
+        np.testing.assert_allclose(CAMERA.focal_px * told[:, :2] / told[:, 2:] + CAMERA.center_px[:, None], W[half])
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
