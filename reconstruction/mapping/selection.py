@@ -23,7 +23,7 @@ from reconstruction.basis.mesh import farthest_points
 from reconstruction.camera import Camera
 from reconstruction.mapping.outliers import medians
 from reconstruction.mapping.solid.placing import FEWEST_VIEWS
-from reconstruction.mapping.solid.rivals import Misfit, Rigid, both, rigid_by, rms
+from reconstruction.mapping.solid.rivals import Misfit, Rigid, both, rigid_by
 from reconstruction.mapping.start import Start, at_once
 
 Kind = Literal["flat", "solid", "sheet"]
@@ -102,13 +102,11 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     views = [(w[:, :, few], h[:, few]) for w, h in seen]
     at = np.searchsorted(few, edges)
     begun = start(rigid_by, views[0], views[1], camera, at)
-    sheet, change, stretch = Misfit(np.nan, np.nan), np.nan, 0.0
-    told_px = np.nan
+    sheet, change, told_px, stretch = Misfit(np.nan, np.nan), np.nan, np.nan, 0.0
     if surface is not None:
         with suppress(ReconstructionError):  # no sheet, then
             shapes, stretch = surface(halves)
-            sheet, change = sheet_misfit([(made, through) for made, through, _ in shapes], seen, edges)
-            told_px = sheet_misfit([(made, told) for made, _, told in shapes], seen, edges)[0].edges_px
+            sheet, change, told_px = sheet_misfit(shapes, seen, edges)
     rigid: Rigid = begun.result()
     kind, sureness = decide(rigid, sheet, stretch, told_px)
     if sureness < PLAIN:
@@ -132,25 +130,27 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan)
     flat, solid = rigid.flat, rigid.solid
     gain = max(flat.whole_px, 1e-300) / max(SOLID_FREEDOM * solid.whole_px, 1e-300)
     best: Kind = "solid" if gain > 1 and rigid.relief > LEAST_RELIEF else "flat"
-    rigid_px, least = solid.edges_px if best == "solid" else min(flat.edges_px, solid.edges_px), SHEET_FREEDOM
+    stiff_px = min(flat.edges_px, solid.edges_px)
+    rigid_px, least = solid.edges_px if best == "solid" else stiff_px, SHEET_FREEDOM
     explained = max(0.0, 1 - (solid.edges_px / max(flat.edges_px, 1e-300)) ** 2)  # by relief, of what a plane leaves
     most = FEW_SIDES_FREEDOM if rigid.turn_degrees < FEW_SIDES_DEG else MOST_FREEDOM
     if not rigid.proven:  # all of its stretching speaks against a sheet, too
         rigid_px, least, explained, most = min(flat.whole_px, solid.whole_px), 1.0, 1.0, MOST_FREEDOM
     freedom = min(least + STRETCH_FREEDOM * stretch * explained, most)
     alone, told = (max(np.nan_to_num(px, nan=np.inf), 1e-300) for px in (sheet.edges_px, told_px))
-    stiff_px = min(flat.edges_px, solid.edges_px)
     sureness = max(rigid_px / (freedom * alone), stiff_px / ((SHEET_FREEDOM + TOLD_FREEDOM * stretch) * told))
     if sureness > 1:
         return "sheet", float(sureness)
     return best, float(min(max(gain, 1 / gain), least * alone / max(rigid_px, 1e-300)))
 
 
-def sheet_misfit(shapes: list[tuple[Array, Array]], seen: list[tuple[Array, Mask]], edges: Indices) -> tuple[Misfit, float]:
-    """Of sheets of the two halves of the keyframes, each on the other half; and the change of lengths.
+def sheet_misfit(
+    shapes: list[tuple[Array, Array, Array]], seen: list[tuple[Array, Mask]], edges: Indices
+) -> tuple[Misfit, float, float]:
+    """Of sheets of the two halves of the keyframes, each on the other half; the change of lengths; and what is left, told.
 
     Args:
-        shapes: (K, 3, p) smooth, and through the points seen, in each half.
+        shapes: (K, 3, p) smooth, through the points seen, and the latter told lengths, in each half.
         seen: those points (K, 2, p) px, and their visibility (K, p).
         edges: (n, 2).
 
@@ -158,19 +158,19 @@ def sheet_misfit(shapes: list[tuple[Array, Array]], seen: list[tuple[Array, Mask
         ReconstructionError: the sheets have no edge in common.
     """
     i, j = edges.T
-    pixels, changes = [], []
-    for (made, _), (_, tested), (W, visible) in zip(shapes, reversed(shapes), reversed(seen), strict=True):
+    left = np.zeros((2, 2, 2))  # by half, alone and told, px and share
+    for row, (made, *_), (_, *tested), (W, visible) in zip(left, shapes, reversed(shapes), reversed(seen), strict=True):
         with np.errstate(divide="ignore"):
-            length, through = (np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)) for S in (made, tested))
-        change = through - medians(length, axis=0)
-        known = visible[:, i] & visible[:, j] & np.isfinite(change)
-        if not known.any():
-            raise ReconstructionError("no edge is known in both halves of the keyframes")
-        change = np.abs(change - np.median(change[known]))
-        size = np.linalg.norm(W[:, :, i] - W[:, :, j], axis=1)
-        pixels.append(np.median((change * size)[known]) / HALF_NORMAL / np.sqrt(2))
-        changes.append(np.median(change[known]) / HALF_NORMAL)
-    return Misfit(rms(pixels), np.nan), rms(changes)
+            logs, *through = (np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)) for S in (made, *tested))
+        usual, size = medians(logs, axis=0), np.linalg.norm(W[:, :, i] - W[:, :, j], axis=1)
+        for k, change in enumerate(one - usual for one in through):
+            known = visible[:, i] & visible[:, j] & np.isfinite(change)
+            if not known.any():
+                raise ReconstructionError("no edge is known in both halves of the keyframes")
+            off = np.abs(change - np.median(change[known]))
+            row[k] = np.median((off * size)[known]) / np.sqrt(2), np.median(off[known])
+    alone, told = np.sqrt((left**2).mean(axis=0)) / HALF_NORMAL
+    return Misfit(float(alone[0]), np.nan), float(alone[1]), float(told[0])
 
 
 def spread_points(W: Array, visible: Mask) -> Indices:
