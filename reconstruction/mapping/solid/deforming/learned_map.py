@@ -7,7 +7,7 @@ import numpy as np
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
-from reconstruction.camera import rotation_from_quaternion
+from reconstruction.camera import quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.bundle import seen_by
@@ -24,7 +24,7 @@ from reconstruction.window.window import SlidingWindow
 
 HIDDEN = 0.15  # of what keyframes show, to see whether it is predicted
 TRIAL = 4  # rounds after which that is plain
-COMPARED = 0.75  # quantile: a deformation may be in one place only, and a tenth may be gross errors
+COMPARED = 0.85  # quantile: a deformation may be in one place only, and a tenth may be gross errors
 BETTER = 0.5  # times what the rigid shape is off there: drifting points of a rigid thing are predicted to 0.66 of it
 
 
@@ -50,12 +50,32 @@ def with_deformations(found: Map, settings: Settings, W: Array, visible: Mask, f
         if not predicted(model, W, hidden, trial, rigid):
             return found
         latest = about(rigid, model, trial)  # whose poses tell better what moves together
-        again, state = begun(latest, settings, W, visible, sound)
+        again = modelled(latest, settings, W, sound)
         log_s = first.log_s + np.log(model.scale / again.scale)  # else each start would let them go further
-        latest = about(latest, again, learned(again, W, visible, state, log_s))
+        latest = about(latest, again, learned(again, W, visible, carried(model, trial, again), log_s))
     except np.linalg.LinAlgError:  # of points that lie as none do
         return found
     return latest.in_order(np.argsort(order))
+
+
+def modelled(found: Map, settings: Settings, W: Array, sound: Mask) -> Model:
+    """Modes by what moves together, for keyframes in their order; arguments as for `begun`."""
+    motion = found.rest.motion
+    apart = own_motion((seen_by(found.camera, motion) - W) / motion.s[:, None, None], sound)
+    return replace(found, modes=MOST_MODES, model=None).modelled(settings, own_motion=apart)
+
+
+def carried(model: Model, known: Learned, again: Model) -> State:
+    """What is known of keyframes by one model, in the modes of another that is about the same rest shape."""
+    state = known.state
+    turn = again.basis.Phi.T @ model.basis.Phi
+    deformed = turn @ state.Lambda @ known.B[3:-1] * (model.radius / again.radius)
+    return State(
+        quaternion_from_rotation(rotation_from_quaternion(state.q) @ turn.T),
+        state.t * (model.radius_px / again.radius_px),
+        state.log_s + np.log(model.scale / again.scale),
+        deformed @ np.linalg.pinv(again.B[3:-1]),
+    )
 
 
 def begun(found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) -> tuple[Model, State]:
@@ -68,9 +88,7 @@ def begun(found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) 
         visible: (K, p).
         sound: (K, p) of that, what is not grossly wrong.
     """
-    motion = found.rest.motion
-    apart = own_motion((seen_by(found.camera, motion) - W) / motion.s[:, None, None], sound)
-    model = replace(found, modes=MOST_MODES, model=None).modelled(settings, own_motion=apart)
+    motion, model = found.rest.motion, modelled(found, settings, W, sound)
     some = well_spread(model.B[:3], visible, POINTS)
     few = model.of_points(some)
     energy = build_energy(few, "general", settings.priors)

@@ -8,7 +8,8 @@ perspective.
 Given the Gaussian, pose and Λ' of a frame are a Gauss-Newton step on the sums over its points (`window.statistics`), and
 the covariance of Λ' is a block of the inverse of its normal matrix. Given those of all frames, the Gaussian has the second
 moments that they have, and the rest shape, free in every point, is what suits all images best. Depth comes to light
-in hundreds of such rounds; every two of them tell where they lead to (`acceleration`).
+in hundreds of such rounds; every two of them tell where they lead to (`acceleration`). Early on, poses that are mirrored
+in depth are put right (`reversal`).
 """
 
 from dataclasses import replace
@@ -23,15 +24,17 @@ from reconstruction.mapping.solid.building import TAIL_SIGMAS
 from reconstruction.mapping.solid.bundle import Loss
 from reconstruction.mapping.solid.deforming.acceleration import extrapolated
 from reconstruction.mapping.solid.deforming.deformations import Deformations, Learned
+from reconstruction.mapping.solid.deforming.reversal import righted
 from reconstruction.mapping.solid.placing import well_spread
 from reconstruction.mapping.solid.spikes import without_new_spikes
 from reconstruction.state import POSE, State
 from reconstruction.window.normal import cholesky, from_lower, inverted
 from reconstruction.window.robust import deviation, lengths
-from reconstruction.window.statistics import Statistics, frame_statistics, residuals, stack
+from reconstruction.window.statistics import frame_statistics, residuals, stack
 from reconstruction.window.terms import data_normal
 
 ROUNDS = 40
+RIGHTED = (4, 12)  # rounds after which poses are put right
 POINTS = 400  # by which it is learned: dense ones are placed afterwards
 BELIEVED = 2.0  # keyframes' worth of a Gaussian in which only the modes differ, by their eigenvalues
 SCALE = 0.02  # deviation of log s from where it was at first: what comes nearer may as well swell
@@ -58,6 +61,8 @@ def learned(model: Model, W: Array, visible: Mask, state: State, log_s: Array, r
     path = [learning.begun(model.B, state)]
     for k in range(1, rounds + 1):
         path.append(learning.round(path[-1]))
+        if k in RIGHTED:
+            path = [righted(path[-1], learning)]
         if len(path) == 3:
             path = [extrapolated(*path) if k < rounds - 1 else path[-1]]
     found = path[-1]
@@ -94,18 +99,59 @@ class ExpectationMaximisation:
 
     def round(self, known: Learned) -> Learned:
         """Noise and rest shape by pose and Λ', these by the Gaussian, and that by them."""
-        B, state, noise = known.B.copy(), known.state, known.deformations.noise
-        off = residuals(B[:, self._some], self._seen, state.matrices(), self._focal)
-        squares = (off**2).sum(axis=1)
-        h = self._visible * robust(noise).weight(squares)
+        B, state, noise, every = known.B.copy(), known.state, known.deformations.noise, slice(None)
+        off, squares, h = self._left_over(known, every)
         total = (h * squares).sum() + len(state) * known.taken * noise**2
         noise = max(float(np.sqrt(total / (2 * h.sum()))), LEAST_NOISE)
         B[:3, self._some] += shifts(self._seen, off, h, state, self._focal)
-        frames = zip(self._seen, h, strict=True)
-        data = stack([frame_statistics(B[:, self._some], one, weight, self._focal) for one, weight in frames])
+        known = replace(known, B=B, deformations=replace(known.deformations, noise=noise))
         precision = inverted(known.deformations.covariance)
-        state, unsure, taken = expected(data, state, precision, noise**2 / len(self._some), self._log_s)
+        H, g = self._normal(known, precision, h, every)
+        state, unsure, taken = expected(H, g, state, precision)
         return self._maximised(B, state, unsure, noise, taken)
+
+    def by_others(self, known: Learned, frames: slice) -> Deformations:
+        """The Gaussian that a round has found, without what some of its frames have given to it."""
+        K, own = len(known.state) + BELIEVED, known.state.Lambda[frames].reshape(-1, len(self._believed))
+        return replace(known.deformations, covariance=(K * known.deformations.covariance - own.T @ own) / (K - len(own)))
+
+    def settled(self, known: Learned, frames: slice, steps: int) -> tuple[State, Array]:
+        """Pose and Λ' of some frames, alone in `known`, after so many steps; minus their log likelihoods (n,)."""
+        precision = inverted(known.deformations.covariance)
+        for _ in range(steps):
+            H, g = self._normal(known, precision, self._left_over(known, frames)[2], frames)
+            step = np.stack([-dpotrs(cholesky(one), right, lower=1)[0] for one, right in zip(H, g, strict=True)])
+            known = replace(known, state=known.state.moved(step, ALL_ROWS))
+        state, noise = known.state, known.deformations.noise
+        Lambda = state.Lambda.reshape(len(state), -1)
+        images = (self._visible[frames] * robust(noise).value(self._left_over(known, frames)[1])).sum(axis=1) / noise**2
+        scales = ((state.log_s - self._log_s[frames]) / SCALE) ** 2
+        return state, images + ((Lambda @ precision * Lambda).sum(axis=1) + scales) / 2
+
+    def _left_over(self, known: Learned, frames: slice) -> tuple[Array, Array, Array]:
+        """Residuals (n, 2, p) of the frames that `known` has, their squared lengths (n, p), and robust weights (n, p)."""
+        off = residuals(known.B[:, self._some], self._seen[frames], known.state.matrices(), self._focal)
+        squares = (off**2).sum(axis=1)
+        return off, squares, self._visible[frames] * robust(known.deformations.noise).weight(squares)
+
+    def _normal(self, known: Learned, precision: Array, h: Array, frames: slice) -> tuple[Array, Array]:
+        """Hessians (n, d, d) and gradients (n, d) of half the energy of the frames that `known` has.
+
+        Args:
+            known: the Gaussian, and where frames are.
+            precision: (3r, 3r) of Λ'.
+            h: (n, p) weights.
+            frames: which of all they are.
+        """
+        state, B, variance = known.state, known.B[:, self._some], known.deformations.noise**2 / len(self._some)
+        sums = [frame_statistics(B, one, w, self._focal) for one, w in zip(self._seen[frames], h, strict=True)]
+        normal = data_normal(stack(sums), state)
+        H, g = normal.diagonal / variance, normal.gradient / variance
+        H[:, POSE:, POSE:] += precision
+        g[:, POSE:] += state.Lambda.reshape(len(state), -1) @ precision
+        H[:, POSE - 1, POSE - 1] += SCALE**-2
+        g[:, POSE - 1] += (state.log_s - self._log_s[frames]) / SCALE**2
+        return H, g
 
     def _maximised(self, B: Array, state: State, unsure: Array, noise: float, taken: float) -> Learned:
         """The Gaussian of frames whose Λ' has the mean covariance `unsure`, about the mean of their shapes."""
@@ -123,31 +169,23 @@ def robust(noise: float) -> Loss:
     return Loss(TAIL_SIGMAS * noise, redescending=True)
 
 
-def expected(data: Statistics, state: State, precision: Array, variance: float, log_s: Array) -> tuple[State, Array, float]:
+def expected(H: Array, g: Array, state: State, precision: Array) -> tuple[State, Array, float]:
     """Pose and Λ' after a step; mean covariance (3r, 3r) of Λ', and mean number of parameters that the images hold.
 
     Args:
-        data: of n frames.
-        state: where these are.
+        H: (n, d, d) Hessians.
+        g: (n, d) gradients.
+        state: where the n frames are.
         precision: (3r, 3r) of Λ'.
-        variance: of the mean of a coordinate over the points.
-        log_s: (n,) to which it is held.
     """
-    n, r3 = len(state), len(precision)
-    normal = data_normal(data, state)
-    H, g = normal.diagonal / variance, normal.gradient / variance
-    H[:, POSE:, POSE:] += precision
-    g[:, POSE:] += state.Lambda.reshape(n, r3) @ precision
-    H[:, POSE - 1, POSE - 1] += SCALE**-2
-    g[:, POSE - 1] += (state.log_s - log_s) / SCALE**2
-    total, step = np.zeros((POSE + r3, POSE + r3)), np.zeros_like(g)
-    for k in range(n):
-        factor = cholesky(H[k])
+    total, step = np.zeros(H.shape[1:]), np.zeros_like(g)
+    for k, one in enumerate(H):
+        factor = cholesky(one)
         step[k] = -dpotrs(factor, g[k], lower=1)[0]
         total += dpotri(factor, lower=1)[0]
-    inverse = from_lower(total) / n
+    inverse = from_lower(total) / len(state)
     held = (inverse[POSE:, POSE:] * precision).sum() + inverse[POSE - 1, POSE - 1] / SCALE**2  # by what is known beforehand
-    return state.moved(step, ALL_ROWS), inverse[POSE:, POSE:], POSE + r3 - float(held)
+    return state.moved(step, ALL_ROWS), inverse[POSE:, POSE:], H.shape[1] - float(held)
 
 
 def shifts(seen: Array, off: Array, h: Array, state: State, focal: float) -> Array:

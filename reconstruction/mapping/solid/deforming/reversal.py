@@ -1,0 +1,58 @@
+"""Depth reversals: from far away a thin shape looks nearly alike from in front and from behind (Necker).
+
+Its mirror image in depth is the shape itself, turned by half a turn about the line of sight and by half a turn about an
+axis across which it is thin. A rigid shape's poses may be reversed wherever it deforms by more than it is thick. Once
+deformations are known in part, they tell: where the pose is right, those of other keyframes explain its image, too. Others
+are all but a quarter, in their order: beside each other they are reversed together, and a Gaussian explains what it was
+made of.
+"""
+
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from reconstruction.arrays import Array
+from reconstruction.camera import quaternion_product
+from reconstruction.mapping.solid.deforming.deformations import Deformations, Learned
+from reconstruction.state import State, join
+
+PARTS = 4
+STEPS = 5
+SURELY = 1.0  # more of log likelihood: it is not turned for nothing
+HALF_TURNS = np.eye(4)[1:]  # quaternions, about the principal axes
+
+
+class Learning(Protocol):
+    """What `learning.ExpectationMaximisation` has to give."""
+
+    def by_others(self, known: Learned, frames: slice) -> Deformations:
+        """The Gaussian by all frames but some."""
+
+    def settled(self, known: Learned, frames: slice, steps: int) -> tuple[State, Array]:
+        """Pose and Λ' of some frames, alone in `known`, after so many steps; minus their log likelihoods (n,)."""
+
+
+def righted(known: Learned, learning: Learning) -> Learned:
+    """The same with each keyframe's pose as it is, or reversed along an axis, whichever the others make likelier.
+
+    Args:
+        known: what a round has found, keyframes in the order of time.
+        learning: what found it.
+    """
+    K, chosen = len(known.state), list[State]()
+    for part in range(PARTS):
+        frames = slice(part * K // PARTS, (part + 1) * K // PARTS)
+        own, by_others = known.state[frames], learning.by_others(known, frames)
+        starts = [own, *(reversed_along(axis, own) for axis in HALF_TURNS)]
+        tried = [learning.settled(replace(known, state=one, deformations=by_others), frames, STEPS) for one in starts]
+        cost = np.stack([cost for _, cost in tried])
+        cost[0] -= SURELY
+        chosen += [tried[best][0][k : k + 1] for k, best in enumerate(cost.argmin(axis=0))]
+    return replace(known, state=join(chosen))
+
+
+def reversed_along(axis: Array, state: State) -> State:
+    """The undeformed shape mirrored in depth, but for its mirror image along an axis, whose half turn is (4,)."""
+    q = quaternion_product(quaternion_product(HALF_TURNS[2], state.q), axis)
+    return replace(state, q=q, Lambda=np.zeros_like(state.Lambda))
