@@ -34,9 +34,10 @@ from reconstruction.window.statistics import frame_statistics, residuals, stack
 from reconstruction.window.terms import data_normal
 
 ROUNDS = 40
-RIGHTED = (4, 12)  # rounds after which poses are put right
+RIGHTED = 4  # the round after which poses are put right
 POINTS = 400  # by which it is learned: dense ones are placed afterwards
 BELIEVED = 2.0  # keyframes' worth of a Gaussian in which only the modes differ, by their eigenvalues
+KEPT = 0.7  # of the points' weights: where rounds lead to, a fifth may be off for a while, and comes back
 SCALE = 0.02  # deviation of log s from where it was at first: what comes nearer may as well swell
 LEAST_NOISE = 7.5e-3  # of the size: neighbours' errors are alike, and what is believed of them goes into depth
 LOOSE = 1e-3  # pull of a point of the rest shape to where it was, of what images say about it
@@ -61,10 +62,10 @@ def learned(model: Model, W: Array, visible: Mask, state: State, log_s: Array, r
     path = [learning.begun(model.B, state)]
     for k in range(1, rounds + 1):
         path.append(learning.round(path[-1]))
-        if k in RIGHTED:
+        if k == RIGHTED:
             path = [righted(path[-1], learning)]
         if len(path) == 3:
-            path = [extrapolated(*path) if k < rounds - 1 else path[-1]]
+            path = [learning.further(*path) if k < rounds - 1 else path[-1]]
     found = path[-1]
     B = found.B.copy()
     if len(some) < B.shape[1]:
@@ -109,6 +110,12 @@ class ExpectationMaximisation:
         H, g = self._normal(known, precision, h, every)
         state, unsure, taken = expected(H, g, state, precision)
         return self._maximised(B, state, unsure, noise, taken)
+
+    def further(self, before: Learned, once: Learned, twice: Learned) -> Learned:
+        """Where two rounds lead to, unless that loses what images show."""
+        there, every = extrapolated(before, once, twice), slice(None)
+        kept = self._left_over(there, every)[2].sum() >= KEPT * self._left_over(twice, every)[2].sum()
+        return there if kept else twice
 
     def by_others(self, known: Learned, frames: slice) -> Deformations:
         """The Gaussian that a round has found, without what some of its frames have given to it."""

@@ -1,7 +1,7 @@
 """Depth reversals: from far away a thin shape looks nearly alike from in front and from behind (Necker).
 
-Its mirror image in depth is the shape itself, turned by half a turn about the line of sight and by half a turn about an
-axis across which it is thin. A rigid shape's poses may be reversed wherever it deforms by more than it is thick. Once
+Its mirror image in depth is the shape itself, turned by half a turn about the line of sight and by another about the axis
+along which it is thin. A rigid shape's poses may be reversed wherever it deforms by more than it is thick. Once
 deformations are known in part, they tell: where the pose is right, those of other keyframes explain its image, too. Others
 are all but a quarter, in their order: beside each other they are reversed together, and a Gaussian explains what it was
 made of.
@@ -20,7 +20,7 @@ from reconstruction.state import State, join
 PARTS = 4
 STEPS = 5
 SURELY = 1.0  # more of log likelihood: it is not turned for nothing
-HALF_TURNS = np.eye(4)[1:]  # quaternions, about the principal axes
+SIGHT = THIN = np.array([0.0, 0.0, 0.0, 1.0])  # half turns, about the third axis of the camera, and of the shape
 
 
 class Learning(Protocol):
@@ -34,7 +34,7 @@ class Learning(Protocol):
 
 
 def righted(known: Learned, learning: Learning) -> Learned:
-    """The same with each keyframe's pose as it is, or reversed along an axis, whichever the others make likelier.
+    """The same with each keyframe's pose as it is, or reversed, whichever the others make likelier.
 
     Args:
         known: what a round has found, keyframes in the order of time.
@@ -44,15 +44,15 @@ def righted(known: Learned, learning: Learning) -> Learned:
     for part in range(PARTS):
         frames = slice(part * K // PARTS, (part + 1) * K // PARTS)
         own, by_others = known.state[frames], learning.by_others(known, frames)
-        starts = [own, *(reversed_along(axis, own) for axis in HALF_TURNS)]
+        starts = own, in_reverse(own)
         tried = [learning.settled(replace(known, state=one, deformations=by_others), frames, STEPS) for one in starts]
-        cost = np.stack([cost for _, cost in tried])
-        cost[0] -= SURELY
-        chosen += [tried[best][0][k : k + 1] for k, best in enumerate(cost.argmin(axis=0))]
+        (own, cost), (other, its_cost) = tried
+        better = its_cost < cost - SURELY
+        chosen += [(other if turned else own)[k : k + 1] for k, turned in enumerate(better)]
     return replace(known, state=join(chosen))
 
 
-def reversed_along(axis: Array, state: State) -> State:
-    """The undeformed shape mirrored in depth, but for its mirror image along an axis, whose half turn is (4,)."""
-    q = quaternion_product(quaternion_product(HALF_TURNS[2], state.q), axis)
+def in_reverse(state: State) -> State:
+    """Poses of the undeformed shape, mirrored in depth but for its thickness."""
+    q = quaternion_product(quaternion_product(SIGHT, state.q), THIN)
     return replace(state, q=q, Lambda=np.zeros_like(state.Lambda))
