@@ -13,7 +13,7 @@ from app.synthetic.path import Path
 
 Shape = Callable[[Array, float], Array]  # of places (n, 2) and a time from 0 to 1: points (n, 3)
 Maker = Callable[[np.random.Generator], Shape]
-JAW = 0.12  # where the mouth is, down from the middle of a head
+JAW, LID = 0.12, 0.28  # where the mouth is, down from the middle of a head; where a box's lid is hung
 HELD_SEEDS = 100  # seeds from this one on are held back
 
 
@@ -151,6 +151,16 @@ def chewing(rng: np.random.Generator) -> Shape:
     return shape
 
 
+def opening(rng: np.random.Generator) -> Shape:
+    """A box whose lid, a fifth of it, opens and shuts: most points tell of no change at all."""
+    pace, a = rng.uniform(2, 4), rng.uniform(0, 2 * np.pi)
+
+    def shape(places: Array, time: float) -> Array:
+        return solid.hinged(solid.box(places), LID, 0.5 * (1 + np.sin(2 * np.pi * pace * time + a)))
+
+    return shape
+
+
 def still(shape: Callable[[Array], Array]) -> Maker:
     """Things that do not change."""
     return lambda _: lambda places, _time: shape(places)
@@ -185,6 +195,7 @@ KINDS = {
     "head-late": Kind("solid", still(solid.head), SOLID_TURN, late=0.5),
     "talking-head": Kind("solid", living(solid.head, 0.06), SOLID_TURN),
     "chewing-head": Kind("solid", chewing, SOLID_TURN),
+    "opening-box": Kind("solid", opening, SOLID_TURN),
     "heart": Kind("solid", living(heart, 0.1), SHEET_TURN),
     "can": Kind("solid", still(solid.can), SOLID_TURN, held_back=True),
     "balloon": Kind("", swelling, SOLID_TURN),

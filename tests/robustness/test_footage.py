@@ -26,7 +26,7 @@ def outcome(clip: Clip, name: str, folder: Path) -> Result:
         pytest.param("background moving, region loose", 0, marks=pytest.mark.whole),
         ("background moving, region found", 0),
         pytest.param("a title card first", 0, marks=pytest.mark.whole),
-        ("leaves the picture, all", 2),
+        pytest.param("leaves the picture, all", 2, marks=pytest.mark.whole),
         pytest.param("watermark over 30 %", 0, marks=pytest.mark.whole),
     ],
 )

@@ -81,6 +81,7 @@ def test_units_do_not_matter(
         assert other.rest_shape == usual.rest_shape
 
 
+@pytest.mark.whole
 def test_a_rest_shape_gives_the_shapes_its_units(shared_data: Path, tmp_path: Path) -> None:
     shapes = []
     for unit in (1.0, MILLI):

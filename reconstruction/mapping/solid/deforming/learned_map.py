@@ -24,8 +24,8 @@ from reconstruction.window.window import SlidingWindow
 
 HIDDEN = 0.15  # of what keyframes show, to see whether it is predicted
 TRIAL = 4  # rounds after which that is plain
-COMPARED = 0.85  # quantile: a deformation may be in one place only, and a tenth may be gross errors
-BETTER = 0.5  # times what the rigid shape is off there: drifting points of a rigid thing are predicted to 0.66 of it
+DRIFT = 0.017  # of the size, RMS: tracks of rigid things are off by up to 0.015, and points beside each other alike
+BETTER = 0.5  # times what the rigid shape is off there
 
 
 def with_deformations(found: Map, settings: Settings, W: Array, visible: Mask, frames: Indices) -> Map:
@@ -45,7 +45,7 @@ def with_deformations(found: Map, settings: Settings, W: Array, visible: Mask, f
     sound, rigid = without_outliers(W, visible), found.in_order(order)
     try:
         model, first = begun(rigid, settings, W, visible, sound)
-        hidden = visible & (np.random.default_rng(0).random(visible.shape) < HIDDEN)
+        hidden = sound & (np.random.default_rng(0).random(visible.shape) < HIDDEN)
         trial = learned(model, W, visible & ~hidden, first, first.log_s, TRIAL)
         if not predicted(model, W, hidden, trial, rigid):
             return found
@@ -102,13 +102,16 @@ def begun(found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) 
 
 
 def predicted(model: Model, W: Array, hidden: Mask, known: Learned, rigid: Map) -> bool:
-    """Whether deformations predict the points (K, p) hidden from them much better than the rigid shape fits them."""
+    """Whether deformations predict the points (K, p) hidden from them much better than the rigid shape fits them.
+
+    In the root mean square, since a part that moves by itself may be small; nothing grossly wrong is among those points.
+    """
     if not hidden.any():
         return False
-    off = residuals(known.B, model.normalised(W), known.state.matrices(), model.focal) * model.radius_px
-    before = seen_by(rigid.camera, rigid.rest.motion) - W
-    now, then = (float(np.quantile(lengths(left)[hidden], COMPARED)) for left in (off, before))
-    return now < BETTER * then
+    off = residuals(known.B, model.normalised(W), known.state.matrices(), model.focal)
+    before = (seen_by(rigid.camera, rigid.rest.motion) - W) / model.radius_px
+    now, then = (float(np.sqrt((lengths(left)[hidden] ** 2).mean())) for left in (off, before))
+    return then > DRIFT and now < BETTER * then
 
 
 def about(found: Map, model: Model, known: Learned) -> Map:
