@@ -57,8 +57,8 @@ def changes(run: Run) -> list[float]:
 @pytest.mark.slow
 def test_the_sample_does_not_flicker_nor_does_the_hand(tmp_path: Path) -> None:
     made = demo.sample()
-    shares = changes(Run(str(made.video), roi=made.roi, frames=":240", output=Output(out=tmp_path / "demo.rrd")))
-    assert max(shares) <= MOST  # measured: 0.0010
+    shares = changes(Run(str(made.video), roi=made.roi, frames="120:240", output=Output(out=tmp_path / "demo.rrd")))
+    assert max(shares) <= MOST  # measured: 0.0008
 
 
 @pytest.mark.whole
