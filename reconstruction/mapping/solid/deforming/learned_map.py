@@ -24,6 +24,7 @@ from reconstruction.window.window import SlidingWindow
 
 HIDDEN = 0.15  # of what keyframes show, to see whether it is predicted
 TRIAL = 4  # rounds after which that is plain
+COMPARED = 0.75  # quantile of what most of it does
 DRIFT = 0.017  # of the size, RMS: tracks of rigid things are off by up to 0.015, and points beside each other alike
 BETTER = 0.5  # times what the rigid shape is off there
 
@@ -104,14 +105,17 @@ def begun(found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) 
 def predicted(model: Model, W: Array, hidden: Mask, known: Learned, rigid: Map) -> bool:
     """Whether deformations predict the points (K, p) hidden from them much better than the rigid shape fits them.
 
-    In the root mean square, since a part that moves by itself may be small; nothing grossly wrong is among those points.
+    Most of them, where all of it changes; or in the root mean square, where a part moves by itself, further than tracks
+    drift. Nothing grossly wrong is among those points.
     """
     if not hidden.any():
         return False
     off = residuals(known.B, model.normalised(W), known.state.matrices(), model.focal)
     before = (seen_by(rigid.camera, rigid.rest.motion) - W) / model.radius_px
-    now, then = (float(np.sqrt((lengths(left)[hidden] ** 2).mean())) for left in (off, before))
-    return then > DRIFT and now < BETTER * then
+    now, then = (lengths(left)[hidden] for left in (off, before))
+    most = np.quantile(now, COMPARED) < BETTER * np.quantile(then, COMPARED)
+    whole = [float(np.sqrt((left**2).mean())) for left in (now, then)]
+    return bool(most) or (whole[1] > DRIFT and whole[0] < BETTER * whole[1])
 
 
 def about(found: Map, model: Model, known: Learned) -> Map:
