@@ -47,6 +47,8 @@ def test_of_a_sheet() -> None:
 
 def test_what_is_not_proven_tells_no_camera(monkeypatch: pytest.MonkeyPatch) -> None:
     W, everything = solid_seen(PERSPECTIVE), np.ones((FRAMES, POINTS), bool)
+    monkeypatch.setattr(Evidence, "proven", True)
+    assert likely_camera(W, everything).perspective
     monkeypatch.setattr(Evidence, "proven", False)
     assert not likely_camera(W, everything).perspective
 

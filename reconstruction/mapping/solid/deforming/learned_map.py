@@ -12,7 +12,7 @@ from reconstruction.mapping.map import Map
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.deformations import Learned
-from reconstruction.mapping.solid.deforming.learning import POINTS, learned
+from reconstruction.mapping.solid.deforming.learning import POINTS, RIGHTED, learned
 from reconstruction.mapping.solid.deforming.own_motion import own_motion
 from reconstruction.mapping.solid.placing import well_spread
 from reconstruction.settings import MOST_MODES, Settings
@@ -23,7 +23,7 @@ from reconstruction.window.statistics import residuals
 from reconstruction.window.window import SlidingWindow
 
 HIDDEN = 0.15  # of what keyframes show, to see whether it is predicted
-TRIAL = 4  # rounds after which that is plain
+TRIAL = RIGHTED  # rounds after which that is plain, and poses are put right
 COMPARED = 0.75  # quantile of what most of it does
 DRIFT = 0.017  # of the size, RMS: tracks of rigid things are off by up to 0.015, and points beside each other alike
 BETTER = 0.5  # times what the rigid shape is off there

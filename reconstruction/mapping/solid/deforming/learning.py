@@ -44,7 +44,7 @@ LOOSE = 1e-3  # pull of a point of the rest shape to where it was, of what image
 
 
 def learned(model: Model, W: Array, visible: Mask, state: State, log_s: Array, rounds: int = ROUNDS) -> Learned:
-    """The Gaussian, and the rest shape about which it is, from where a window has found the keyframes to be.
+    """The Gaussian, and the rest shape about which it is, from where the keyframes were found to be so far.
 
     Args:
         model: a solid with its modes.

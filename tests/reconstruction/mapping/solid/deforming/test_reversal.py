@@ -12,7 +12,7 @@ from reconstruction.camera import Camera, quaternion_from_rotation, rotation_fro
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.deforming import learning
-from reconstruction.mapping.solid.deforming.learned_map import carried, modelled
+from reconstruction.mapping.solid.deforming.learned_map import about, carried, modelled
 from reconstruction.mapping.solid.deforming.learning import ExpectationMaximisation, learned
 from reconstruction.mapping.solid.deforming.reversal import in_reverse, righted
 from reconstruction.settings import Settings
@@ -24,7 +24,7 @@ EVERYTHING = np.ones((K, P), np.bool_)
 REVERSED = slice(12, 17)
 
 
-def fish(camera: Camera) -> tuple[Array, Array, Model, State]:
+def fish(camera: Camera) -> tuple[Array, Array, Map, Model, State]:
     """A fish that turns once around and beats its tail: images, shapes (K, 3, P), and its rigid shape in all poses.
 
     The poses of some frames in a row are mirrored, as by a rigid shape that beats it the other way.
@@ -47,7 +47,7 @@ def fish(camera: Camera) -> tuple[Array, Array, Model, State]:
     model = modelled(rigid, Settings(), W, EVERYTHING)
     hardly = 1e-3 * rng.normal(size=(K, 3, len(model.basis.eigenvalues)))
     state = State(quaternion_from_rotation(R @ model.basis.Phi), np.zeros((K, 2)), np.zeros(K), hardly)
-    return W, placed, model, state
+    return W, placed, rigid, model, state
 
 
 def turned(B: Array, state: State) -> Array:
@@ -56,7 +56,7 @@ def turned(B: Array, state: State) -> Array:
 
 @pytest.mark.parametrize("camera", [ORTHOGRAPHIC, PERSPECTIVE])
 def test_a_fish_that_turns_around_is_learned(camera: Camera, monkeypatch: pytest.MonkeyPatch) -> None:
-    W, placed, model, state = fish(camera)
+    W, placed, _, model, state = fish(camera)
 
     def error() -> float:
         known = learned(model, W, EVERYTHING, state, state.log_s, rounds=30)
@@ -69,7 +69,7 @@ def test_a_fish_that_turns_around_is_learned(camera: Camera, monkeypatch: pytest
 
 
 def test_only_what_is_reversed_is_turned() -> None:
-    W, _, model, state = fish(ORTHOGRAPHIC)
+    W, _, _, model, state = fish(ORTHOGRAPHIC)
     rounds = ExpectationMaximisation(model, np.arange(P), model.normalised(W), EVERYTHING, state.log_s)
     known = rounds.begun(model.B, state)
     for _ in range(learning.RIGHTED):
@@ -82,7 +82,7 @@ def test_only_what_is_reversed_is_turned() -> None:
 
 
 def test_a_flat_shape_in_reverse_looks_the_same() -> None:
-    _, _, model, state = fish(ORTHOGRAPHIC)
+    _, _, _, model, state = fish(ORTHOGRAPHIC)
     flat = model.B.copy()
     flat[2] = 0.0
     state = replace(state, Lambda=np.zeros_like(state.Lambda))
@@ -93,22 +93,16 @@ def test_a_flat_shape_in_reverse_looks_the_same() -> None:
 
 
 def test_what_is_known_is_carried_to_other_modes() -> None:
-    W, _, model, state = fish(PERSPECTIVE)
+    W, _, rigid, model, state = fish(PERSPECTIVE)
     known = learned(model, W, EVERYTHING, state, state.log_s, rounds=6)
-    motion = RigidMotion(
-        model.radius * model.basis.Phi @ known.B[:3],
-        rotation_from_quaternion(known.state.q) @ model.basis.Phi.T,
-        model.scale * np.exp(known.state.log_s),
-        model.radius_px * known.state.t,
-    )
-    again = modelled(Map(RestShape("rigid", motion, "made here"), PERSPECTIVE), Settings(), W, EVERYTHING)
+    again = modelled(about(rigid, model, known), Settings(), W, EVERYTHING)
     before, after = turned(known.B, known.state), turned(again.B, carried(model, known, again))
     assert e3d(after, before).max() < 0.01
     np.testing.assert_allclose(after * again.radius_px, before * model.radius_px, atol=0.02 * model.radius_px)
 
 
 def test_where_rounds_lead_to_is_left_if_it_loses_the_images(monkeypatch: pytest.MonkeyPatch) -> None:
-    W, _, model, state = fish(ORTHOGRAPHIC)
+    W, _, _, model, state = fish(ORTHOGRAPHIC)
     rounds = ExpectationMaximisation(model, np.arange(P), model.normalised(W), EVERYTHING, state.log_s)
     path = [rounds.begun(model.B, state)]
     path += [rounds.round(path[0])]
