@@ -5,42 +5,25 @@ coefficients go together, and how far, tells of every frame what its image leave
 (PAMI 2008) found this for points that are free to move; here it is done in the space of the paper's modes, and in
 perspective.
 
-Given the Gaussian, pose and Λ' of a frame are a Gauss-Newton step on the sums over its points (`window.statistics`), and
-the covariance of Λ' is a block of the inverse of its normal matrix. Given those of all frames, the Gaussian has the second
-moments that they have, and the rest shape, free in every point, is what suits all images best. Depth comes to light
-in hundreds of such rounds; every two of them tell where they lead to (`acceleration`). Early on, poses that are mirrored
-in depth are put right (`reversal`).
+Depth comes to light in hundreds of rounds (`rounds`); every two of them tell where they lead to. Early on, poses that are
+mirrored in depth are put right (`reversal`).
 """
 
 from dataclasses import replace
 
-import numpy as np
-from scipy.linalg.lapack import dpotri, dpotrs
-
-from reconstruction.arrays import Array, Indices, Mask
-from reconstruction.basis.constraints import ALL_ROWS
+from reconstruction.arrays import Array, Mask
 from reconstruction.basis.model import Model
-from reconstruction.mapping.solid.building import TAIL_SIGMAS
-from reconstruction.mapping.solid.bundle import Loss
-from reconstruction.mapping.solid.deforming.acceleration import extrapolated
-from reconstruction.mapping.solid.deforming.deformations import Deformations, Learned
+from reconstruction.mapping.solid.deforming.deformations import Learned
 from reconstruction.mapping.solid.deforming.reversal import righted
+from reconstruction.mapping.solid.deforming.rounds import Rounds, robust, shifts
 from reconstruction.mapping.solid.placing import well_spread
 from reconstruction.mapping.solid.spikes import without_new_spikes
-from reconstruction.state import POSE, State
-from reconstruction.window.normal import cholesky, from_lower, inverted
-from reconstruction.window.robust import deviation, lengths
-from reconstruction.window.statistics import frame_statistics, residuals, stack
-from reconstruction.window.terms import data_normal
+from reconstruction.state import State
+from reconstruction.window.statistics import residuals
 
 ROUNDS = 40
 RIGHTED = 4  # the round after which poses are put right
 POINTS = 400  # by which it is learned: dense ones are placed afterwards
-BELIEVED = 2.0  # keyframes' worth of a Gaussian in which only the modes differ, by their eigenvalues
-KEPT = 0.7  # of the points' weights: where rounds lead to, a fifth may be off for a while, and comes back
-SCALE = 0.02  # deviation of log s from where it was at first: what comes nearer may as well swell
-LEAST_NOISE = 7.5e-3  # of the size: neighbours' errors are alike, and what is believed of them goes into depth
-LOOSE = 1e-3  # pull of a point of the rest shape to where it was, of what images say about it
 
 
 def learned(model: Model, W: Array, visible: Mask, state: State, log_s: Array, rounds: int = ROUNDS) -> Learned:
@@ -58,7 +41,7 @@ def learned(model: Model, W: Array, visible: Mask, state: State, log_s: Array, r
         LinAlgError: no Gaussian holds the points.
     """
     seen, some = model.normalised(W), well_spread(model.B[:3], visible, POINTS)
-    learning = ExpectationMaximisation(model, some, seen[:, :, some], visible[:, some], log_s)
+    learning = Rounds(model, some, seen[:, :, some], visible[:, some], log_s)
     path = [learning.begun(model.B, state)]
     for k in range(1, rounds + 1):
         path.append(learning.round(path[-1]))
@@ -74,140 +57,3 @@ def learned(model: Model, W: Array, visible: Mask, state: State, log_s: Array, r
         B[:3] += shifts(seen, off, h, found.state, model.focal)
     B[:3] = without_new_spikes(B[:3], model.B[:3], visible)
     return replace(found, B=B)
-
-
-class ExpectationMaximisation:
-    """Rounds that make keyframes likelier.
-
-    Args:
-        model: a solid with its modes.
-        some: (n,) points of it that are looked at.
-        seen: (K, 2, n) where, in units of the shape's size; finite.
-        visible: (K, n).
-        log_s: (K,) to which scales are held.
-    """
-
-    def __init__(self, model: Model, some: Indices, seen: Array, visible: Mask, log_s: Array) -> None:
-        self._some, self._seen, self._visible, self._focal, self._log_s = some, seen, visible, model.focal, log_s
-        alike = np.tile(model.basis.eigenvalues**0.5, 3)
-        self._believed = np.diag(alike / alike.sum())
-
-    def begun(self, B: Array, state: State) -> Learned:
-        """What keyframes tell by where they are, with the basis B (4 + r, p)."""
-        off = residuals(B[:, self._some], self._seen, state.matrices(), self._focal)
-        noise = deviation(lengths(off)[self._visible], LEAST_NOISE)
-        return self._maximised(B, state, np.zeros_like(self._believed), noise, 0.0)
-
-    def round(self, known: Learned) -> Learned:
-        """Noise and rest shape by pose and Λ', these by the Gaussian, and that by them."""
-        B, state, noise, every = known.B.copy(), known.state, known.deformations.noise, slice(None)
-        off, squares, h = self._left_over(known, every)
-        total = (h * squares).sum() + len(state) * known.taken * noise**2
-        noise = max(float(np.sqrt(total / (2 * h.sum()))), LEAST_NOISE)
-        B[:3, self._some] += shifts(self._seen, off, h, state, self._focal)
-        known = replace(known, B=B, deformations=replace(known.deformations, noise=noise))
-        precision = inverted(known.deformations.covariance)
-        H, g = self._normal(known, precision, h, every)
-        state, unsure, taken = expected(H, g, state, precision)
-        return self._maximised(B, state, unsure, noise, taken)
-
-    def further(self, before: Learned, once: Learned, twice: Learned) -> Learned:
-        """Where two rounds lead to, unless that loses what images show."""
-        there, every = extrapolated(before, once, twice), slice(None)
-        kept = self._left_over(there, every)[2].sum() >= KEPT * self._left_over(twice, every)[2].sum()
-        return there if kept else twice
-
-    def by_others(self, known: Learned, frames: slice) -> Deformations:
-        """The Gaussian that a round has found, without what some of its frames have given to it."""
-        K, own = len(known.state) + BELIEVED, known.state.Lambda[frames].reshape(-1, len(self._believed))
-        return replace(known.deformations, covariance=(K * known.deformations.covariance - own.T @ own) / (K - len(own)))
-
-    def settled(self, known: Learned, frames: slice, steps: int) -> tuple[State, Array]:
-        """Pose and Λ' of some frames, alone in `known`, after so many steps; minus their log likelihoods (n,)."""
-        precision = inverted(known.deformations.covariance)
-        for _ in range(steps):
-            H, g = self._normal(known, precision, self._left_over(known, frames)[2], frames)
-            step = np.stack([-dpotrs(cholesky(one), right, lower=1)[0] for one, right in zip(H, g, strict=True)])
-            known = replace(known, state=known.state.moved(step, ALL_ROWS))
-        state, noise = known.state, known.deformations.noise
-        Lambda = state.Lambda.reshape(len(state), -1)
-        images = (self._visible[frames] * robust(noise).value(self._left_over(known, frames)[1])).sum(axis=1) / noise**2
-        scales = ((state.log_s - self._log_s[frames]) / SCALE) ** 2
-        return state, images + ((Lambda @ precision * Lambda).sum(axis=1) + scales) / 2
-
-    def _left_over(self, known: Learned, frames: slice) -> tuple[Array, Array, Array]:
-        """Residuals (n, 2, p) of the frames that `known` has, their squared lengths (n, p), and robust weights (n, p)."""
-        off = residuals(known.B[:, self._some], self._seen[frames], known.state.matrices(), self._focal)
-        squares = (off**2).sum(axis=1)
-        return off, squares, self._visible[frames] * robust(known.deformations.noise).weight(squares)
-
-    def _normal(self, known: Learned, precision: Array, h: Array, frames: slice) -> tuple[Array, Array]:
-        """Hessians (n, d, d) and gradients (n, d) of half the energy of the frames that `known` has.
-
-        Args:
-            known: the Gaussian, and where frames are.
-            precision: (3r, 3r) of Λ'.
-            h: (n, p) weights.
-            frames: which of all they are.
-        """
-        state, B, variance = known.state, known.B[:, self._some], known.deformations.noise**2 / len(self._some)
-        sums = [frame_statistics(B, one, w, self._focal) for one, w in zip(self._seen[frames], h, strict=True)]
-        normal = data_normal(stack(sums), state)
-        H, g = normal.diagonal / variance, normal.gradient / variance
-        H[:, POSE:, POSE:] += precision
-        g[:, POSE:] += state.Lambda.reshape(len(state), -1) @ precision
-        H[:, POSE - 1, POSE - 1] += SCALE**-2
-        g[:, POSE - 1] += (state.log_s - self._log_s[frames]) / SCALE**2
-        return H, g
-
-    def _maximised(self, B: Array, state: State, unsure: Array, noise: float, taken: float) -> Learned:
-        """The Gaussian of frames whose Λ' has the mean covariance `unsure`, about the mean of their shapes."""
-        K, mean = len(state), state.Lambda.mean(axis=0)
-        B = np.concatenate([B[:3] + mean @ B[3:-1], B[3:]])
-        state = replace(state, Lambda=state.Lambda - mean)
-        Lambda = state.Lambda.reshape(K, -1)
-        moments = Lambda.T @ Lambda / K + unsure
-        covariance = (K * moments + BELIEVED * np.trace(moments) * self._believed) / (K + BELIEVED)
-        return Learned(B, state, Deformations(covariance, noise), taken)
-
-
-def robust(noise: float) -> Loss:
-    """The loss of residuals with that deviation."""
-    return Loss(TAIL_SIGMAS * noise, redescending=True)
-
-
-def expected(H: Array, g: Array, state: State, precision: Array) -> tuple[State, Array, float]:
-    """Pose and Λ' after a step; mean covariance (3r, 3r) of Λ', and mean number of parameters that the images hold.
-
-    Args:
-        H: (n, d, d) Hessians.
-        g: (n, d) gradients.
-        state: where the n frames are.
-        precision: (3r, 3r) of Λ'.
-    """
-    total, step = np.zeros(H.shape[1:]), np.zeros_like(g)
-    for k, one in enumerate(H):
-        factor = cholesky(one)
-        step[k] = -dpotrs(factor, g[k], lower=1)[0]
-        total += dpotri(factor, lower=1)[0]
-    inverse = from_lower(total) / len(state)
-    held = (inverse[POSE:, POSE:] * precision).sum() + inverse[POSE - 1, POSE - 1] / SCALE**2  # by what is known beforehand
-    return state.moved(step, ALL_ROWS), inverse[POSE:, POSE:], H.shape[1] - float(held)
-
-
-def shifts(seen: Array, off: Array, h: Array, state: State, focal: float) -> Array:
-    """Of the rest shape's points (3, p), poses and deformations known, by linear least squares.
-
-    Args:
-        seen: (K, 2, p) in units of the shape's size,
-        off: (K, 2, p) its residuals,
-        h: (K, p) and their weights.
-        state: pose and Λ' (n = K).
-        focal: in the same units.
-    """
-    A = state.scaled_rotations()
-    rows = A[:, :2, :, None] - seen[:, :, None] / focal * A[:, 2:, :, None]  # (K, 2, 3, p)
-    normal = np.einsum("kp,kuap,kubp->pab", h, rows, rows, optimize=True)
-    right = np.einsum("kp,kuap,kup->pa", h, rows, off, optimize=True)
-    loose = (LOOSE * np.trace(normal, axis1=1, axis2=2) + np.finfo(float).tiny ** 0.5)[:, None, None] * np.eye(3)
-    return np.asarray(np.linalg.solve(normal + loose, right[:, :, None])[:, :, 0].T)

@@ -8,13 +8,12 @@ made of.
 """
 
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
-from reconstruction.arrays import Array
 from reconstruction.camera import quaternion_product
-from reconstruction.mapping.solid.deforming.deformations import Deformations, Learned
+from reconstruction.mapping.solid.deforming.deformations import Learned
+from reconstruction.mapping.solid.deforming.rounds import Rounds
 from reconstruction.state import State, join
 
 PARTS = 4
@@ -23,29 +22,19 @@ SURELY = 1.0  # more of log likelihood: it is not turned for nothing
 SIGHT = THIN = np.array([0.0, 0.0, 0.0, 1.0])  # half turns, about the third axis of the camera, and of the shape
 
 
-class Learning(Protocol):
-    """What `learning.ExpectationMaximisation` has to give."""
-
-    def by_others(self, known: Learned, frames: slice) -> Deformations:
-        """The Gaussian by all frames but some."""
-
-    def settled(self, known: Learned, frames: slice, steps: int) -> tuple[State, Array]:
-        """Pose and Λ' of some frames, alone in `known`, after so many steps; minus their log likelihoods (n,)."""
-
-
-def righted(known: Learned, learning: Learning) -> Learned:
+def righted(known: Learned, rounds: Rounds) -> Learned:
     """The same with each keyframe's pose as it is, or reversed, whichever the others make likelier.
 
     Args:
         known: what a round has found, keyframes in the order of time.
-        learning: what found it.
+        rounds: what found it.
     """
     K, chosen = len(known.state), list[State]()
     for part in range(PARTS):
         frames = slice(part * K // PARTS, (part + 1) * K // PARTS)
-        own, by_others = known.state[frames], learning.by_others(known, frames)
+        own, by_others = known.state[frames], rounds.by_others(known, frames)
         starts = own, in_reverse(own)
-        tried = [learning.settled(replace(known, state=one, deformations=by_others), frames, STEPS) for one in starts]
+        tried = [rounds.settled(replace(known, state=one, deformations=by_others), frames, STEPS) for one in starts]
         (own, cost), (other, its_cost) = tried
         better = its_cost < cost - SURELY
         chosen += [(other if turned else own)[k : k + 1] for k, turned in enumerate(better)]

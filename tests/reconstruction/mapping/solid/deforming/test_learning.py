@@ -9,7 +9,7 @@ from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.solid.deforming import learned_map, learning
+from reconstruction.mapping.solid.deforming import learned_map, rounds
 from reconstruction.mapping.solid.deforming.learned_map import begun, with_deformations
 from reconstruction.mapping.solid.deforming.learning import POINTS, learned
 from reconstruction.mapping.solid.solid import bundle_adjust
@@ -61,7 +61,7 @@ def test_it_takes_fewer_rounds_since_two_tell_where_they_lead_to(monkeypatch: py
     found = mapped(W, visible, PERSPECTIVE)
     model, before = begun(found, Settings(), W, visible, visible)
     quick = learned(model, W, visible, before, before.log_s, rounds=16)
-    monkeypatch.setattr(learning, "extrapolated", lambda *path: path[-1])
+    monkeypatch.setattr(rounds, "extrapolated", lambda *path: path[-1])
     slow = learned(model, W, visible, before, before.log_s, rounds=16)
     errors = [e3d(turned(known.B, known.state), shapes).mean() for known in (quick, slow)]
     assert errors[0] < 0.9 * errors[1]

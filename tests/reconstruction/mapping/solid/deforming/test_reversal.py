@@ -12,9 +12,11 @@ from reconstruction.camera import Camera, quaternion_from_rotation, rotation_fro
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.deforming import learning
+from reconstruction.mapping.solid.deforming import rounds as em
 from reconstruction.mapping.solid.deforming.learned_map import about, carried, modelled
-from reconstruction.mapping.solid.deforming.learning import ExpectationMaximisation, learned
+from reconstruction.mapping.solid.deforming.learning import learned
 from reconstruction.mapping.solid.deforming.reversal import in_reverse, righted
+from reconstruction.mapping.solid.deforming.rounds import Rounds
 from reconstruction.settings import Settings
 from reconstruction.state import State
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, seen
@@ -63,14 +65,14 @@ def test_a_fish_that_turns_around_is_learned(camera: Camera, monkeypatch: pytest
         return float(e3d(turned(known.B, known.state), placed)[REVERSED].mean())
 
     now = error()
-    monkeypatch.setattr(learning, "righted", lambda known, _learning: known)
+    monkeypatch.setattr(learning, "righted", lambda known, _rounds: known)
     assert now < 0.015  # measured: 0.0108, 0.0112
     assert now < 0.5 * error()
 
 
 def test_only_what_is_reversed_is_turned() -> None:
     W, _, _, model, state = fish(ORTHOGRAPHIC)
-    rounds = ExpectationMaximisation(model, np.arange(P), model.normalised(W), EVERYTHING, state.log_s)
+    rounds = Rounds(model, np.arange(P), model.normalised(W), EVERYTHING, state.log_s)
     known = rounds.begun(model.B, state)
     for _ in range(learning.RIGHTED):
         known = rounds.round(known)
@@ -103,11 +105,11 @@ def test_what_is_known_is_carried_to_other_modes() -> None:
 
 def test_where_rounds_lead_to_is_left_if_it_loses_the_images(monkeypatch: pytest.MonkeyPatch) -> None:
     W, _, _, model, state = fish(ORTHOGRAPHIC)
-    rounds = ExpectationMaximisation(model, np.arange(P), model.normalised(W), EVERYTHING, state.log_s)
+    rounds = Rounds(model, np.arange(P), model.normalised(W), EVERYTHING, state.log_s)
     path = [rounds.begun(model.B, state)]
     path += [rounds.round(path[0])]
     path += [rounds.round(path[1])]
     assert rounds.further(*path) is not path[2]
     lost = replace(path[2], state=replace(path[2].state, t=path[2].state.t + 1.0))
-    monkeypatch.setattr(learning, "extrapolated", lambda *_: lost)
+    monkeypatch.setattr(em, "extrapolated", lambda *_: lost)
     assert rounds.further(*path) is path[2]
