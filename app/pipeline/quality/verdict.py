@@ -37,6 +37,7 @@ TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 # its depth may be off, and more.
 FAIR_DEPTH = 0.0125
 FAIR_CHANGE, POOR_CHANGE = 0.028, 0.04  # the same with noise, over the radius alone: what changes is no longer small
+WITH_TURN = 0.7  # share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
@@ -182,6 +183,9 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         yield from of_turn(found, found.evidence)
     if found.rest.kind == "rigid":
         yield from of_solid(found.rest.motion, found.evidence)
+        if found.deformations is not None and found.deformations.turning > WITH_TURN:
+            told = f"{found.deformations.turning:.0%} of its changes go with its turn: which is which is a guess"
+            yield Verdict("fair", f"{told}; film it turning while it keeps its shape")
         rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
         if rare > MOST_RARE:
             yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")

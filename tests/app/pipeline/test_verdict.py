@@ -134,7 +134,7 @@ class Sheet:
 
 
 def test_what_deforms_may_seem_to_turn() -> None:
-    deforms = replace(SOLID, deformations=cast(Deformations, object()))
+    deforms = replace(SOLID, deformations=Deformations(np.eye(3), 0.01))
     noisy = replace(EVIDENCE, turn_degrees=14.0, solid=Misfit(1.0, 1.0))
     assert verdict(course([0.003] * 50), replace(SOLID, evidence=noisy)).grade == "fair"
     assert verdict(course([0.003] * 50), deforms).grade == "good"
@@ -143,6 +143,13 @@ def test_what_deforms_may_seem_to_turn() -> None:
     said = verdict(course([0.003] * 50), replace(deforms, evidence=hardly))
     assert said.grade == "fair"
     assert "turned by 14° alone" in said.reason
+
+
+@pytest.mark.parametrize(("turning", "grade"), [(0.6, "good"), (0.85, "fair")])
+def test_changes_that_go_with_the_turn(turning: float, grade: str) -> None:
+    said = verdict(course([0.001] * 50), replace(SOLID, deformations=Deformations(np.eye(3), 0.01, turning)))
+    assert said.grade == grade
+    assert ("85% of its changes go with its turn" in said.reason) == (grade == "fair")
 
 
 def test_a_sheet_that_stretches_while_nothing_turns_may_be_anything() -> None:

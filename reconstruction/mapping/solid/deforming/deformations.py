@@ -5,9 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reconstruction.arrays import Array
+from reconstruction.camera import rotation_from_quaternion
 from reconstruction.state import State
 from reconstruction.window.energy import Pull
 from reconstruction.window.normal import inverted
+
+RIDGE = 1e-3  # of a rotation's entries squared, against turns about one axis, which leave some of them alike
 
 
 @dataclass(frozen=True)
@@ -17,10 +20,12 @@ class Deformations:
     Attributes:
         covariance: (3r, 3r) of Λ', row after row.
         noise: standard deviation of a coordinate of an image point, over the shape's size.
+        turning: share of the keyframes' Λ' that goes with their turn, so that which is which is a guess.
     """
 
     covariance: Array
     noise: float
+    turning: float = 0.0
 
     def pull(self, points: int) -> Pull:
         """What it adds to the energy of a frame of so many points."""
@@ -48,3 +53,16 @@ class Learned:
     state: State
     deformations: Deformations
     taken: float = 0.0
+
+
+def going_with_turn(state: State) -> float:
+    """Share of the variance of Λ' that a frame's rotation foretells, linearly, by all other frames; 0 if it misleads.
+
+    Things that turn once while they swell once would look alike if they were deeper and swelled less.
+    """
+    K = len(state)
+    turn = rotation_from_quaternion(state.q)[:, :2].reshape(K, -1)
+    known, told = (values - values.mean(axis=0) for values in (turn, state.Lambda.reshape(K, -1)))
+    hat = known @ np.linalg.solve(known.T @ known + RIDGE * K * np.eye(known.shape[1]), known.T)
+    left = (told - hat @ told) / (1 - 1 / K - np.diag(hat))[:, None]
+    return float(max(0.0, 1 - (left**2).sum() / max((told**2).sum(), np.finfo(float).tiny)))

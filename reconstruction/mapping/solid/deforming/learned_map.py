@@ -11,7 +11,7 @@ from reconstruction.camera import quaternion_from_rotation, rotation_from_quater
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.bundle import seen_by
-from reconstruction.mapping.solid.deforming.deformations import Learned
+from reconstruction.mapping.solid.deforming.deformations import Learned, going_with_turn
 from reconstruction.mapping.solid.deforming.learning import POINTS, RIGHTED, learned
 from reconstruction.mapping.solid.deforming.own_motion import own_motion
 from reconstruction.mapping.solid.placing import well_spread
@@ -126,4 +126,5 @@ def about(found: Map, model: Model, known: Learned) -> Map:
     motion = RigidMotion(shape, R, s, model.radius_px * state.t)
     rest = replace(found.rest, motion=motion)
     model = Model(replace(model.basis, rest=shape), model.mesh, model.camera, float(motion.s[0]))
-    return replace(found, rest=rest, modes=len(model.basis.eigenvalues), model=model, deformations=known.deformations)
+    deformations = replace(known.deformations, turning=going_with_turn(state))
+    return replace(found, rest=rest, modes=len(model.basis.eigenvalues), model=model, deformations=deformations)
