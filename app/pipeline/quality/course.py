@@ -14,7 +14,7 @@ class Course:
 
     Attributes:
         frames: of the source.
-        errors: median residual over the RMS radius of the image; NaN where nothing is seen.
+        errors: median residual over the image's median radius, which no stray point enlarges; NaN where nothing is seen.
         errors_px: median residual.
         shares: of the points seen.
         lost: frames without the object.
@@ -30,7 +30,8 @@ class Course:
         """Add the estimate of a source frame."""
         seen = estimate.residual_px[estimate.visible]
         error_px = float(np.median(seen)) if len(seen) else np.nan
-        radius_px = float(np.sqrt(np.var(estimate.projection_px, axis=0).sum()))
+        apart = estimate.projection_px - np.median(estimate.projection_px, axis=0)
+        radius_px = float(np.sqrt(np.median((apart**2).sum(axis=1))))
         self.frames.append(frame)
         self.errors.append(error_px / max(radius_px, 1e-12))
         self.errors_px.append(error_px)

@@ -67,7 +67,7 @@ class Build:
             return []
         shape = np.zeros((3, len(often)))
         shape[:, often] = found.motion.shape
-        bundle = located(self.W, self.h, Bundle(replace(found.motion, shape=shape), self.kappa), ~often)
+        bundle = located(self.W, self.h, Bundle(replace(found.motion, shape=shape), self.kappa), ~often, flat=self.flat)
         return [bundle, bundle.reversed()] if self.kappa else [bundle]
 
     def grown(self, start: RigidMotion) -> Bundle:
@@ -79,7 +79,7 @@ class Build:
             known = (self.h[:count] > 0).sum(axis=0) >= min(SEEN_TWICE, count)
             placing = self._by(known, count)
             bundle, _ = placing.adjusted(placing.with_views(bundle, more), PLACING)
-            bundle = located(self.W[:more], self.h[:more], bundle, ~known)
+            bundle = located(self.W[:more], self.h[:more], bundle, ~known, flat=self.flat)
             bundle, _ = self.adjusted(bundle, GROWING)
             count = more
         return bundle
@@ -96,7 +96,7 @@ class Build:
 
         What agrees best gives the poses; a mouth that opens and shuts would be where it is most often, not in between.
         """
-        shape = placed_by(self.W, self.h, bundle)
+        shape = placed_by(self.W, self.h, bundle, flat=self.flat)
         shape[:, points] = bundle.motion.shape
         bundle = Bundle(replace(bundle.motion, shape=shape), bundle.kappa)
         for _ in range(ROUNDS):
@@ -105,7 +105,7 @@ class Build:
             own = np.nan_to_num(medians(residual, axis=0)) / RAYLEIGH_MEDIAN
             scale = TAIL_SIGMAS * sigma if self.flat else OWN_SIGMAS * own.clip(sigma)  # nothing of a plane is livelier
             bundle, _ = self._minimised(bundle, Loss(scale, True), sigma, PLACING_POINTS)
-        return located(self.W, self.h, bundle, (self.h > 0).sum(axis=0) < SEEN_TWICE)
+        return located(self.W, self.h, bundle, (self.h > 0).sum(axis=0) < SEEN_TWICE, flat=self.flat)
 
     def with_views(self, bundle: Bundle, count: int) -> Bundle:
         """The first `count` views, new ones posed as the view they are built on."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
+from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.mapping.solid.bundle import Bundle
 
@@ -48,10 +49,10 @@ def placed_like(first: Array, shape: Array) -> RigidMotion:
     return RigidMotion(float(size.mean()) * turned, np.eye(3)[None], np.ones(1), t[None])
 
 
-def placed_by(W: Array, h: Array, bundle: Bundle) -> Array:
+def placed_by(W: Array, h: Array, bundle: Bundle, *, flat: bool) -> Array:
     """Points (3, p) where views (K, 2, p) with weights (K, p) see them, by linear least squares; unseen ones in the middle.
 
-    Of a view (s R_xy − κ u s R_z) X = u − t.
+    Of a view (s R_xy − κ u s R_z) X = u − t. If it is flat, X is on the plane through the bundle's own points.
     """
     m = bundle.motion
     turned = m.s[:, None, None] * m.R
@@ -59,21 +60,25 @@ def placed_by(W: Array, h: Array, bundle: Bundle) -> Array:
     normal = np.einsum("kp,kuap,kubp->pab", h, rows, rows)
     right = np.einsum("kp,kuap,kup->pa", h, rows, W - m.t[:, :, None])
     middle = m.shape.mean(axis=1)
-    loose = 1e-6 * normal.max(initial=1e-300) * np.eye(3)
-    return np.asarray(np.linalg.solve(normal + loose, (right + loose @ middle)[:, :, None])[:, :, 0].T)
+    along = principal_axes(m.shape)[:, : 2 if flat else 3]
+    normal, right = along.T @ normal @ along, (right - normal @ middle) @ along
+    loose = 1e-6 * normal.max(initial=1e-300) * np.eye(along.shape[1])
+    return middle[:, None] + along @ np.linalg.solve(normal + loose, right[:, :, None])[:, :, 0].T
 
 
-def located(W: Array, h: Array, bundle: Bundle, points: Mask) -> Bundle:
+def located(W: Array, h: Array, bundle: Bundle, points: Mask, *, flat: bool) -> Bundle:
     """A bundle in which points (p,) are where its views (K, 2, p) with weights (K, p) see them, others stay.
 
-    Where two views or more do not place them well they are as far away as others beside them, in a view that shows both.
+    If it is flat, on the plane through these. Else, where two views or more do not place them well they are as far away as
+    others beside them, in a view that shows both.
     """
     m, seen = bundle.motion, h > 0
     middle = np.median(m.shape[:, ~points], axis=1, keepdims=True)
     usual = np.sqrt(np.median(((m.shape[:, ~points] - middle) ** 2).sum(axis=0)))
-    place = placed_by(W[:, :, points], h[:, points], bundle)
+    known = Bundle(replace(m, shape=m.shape[:, ~points]), bundle.kappa)
+    place = placed_by(W[:, :, points], h[:, points], known, flat=flat)
     far = bundle.farness(Bundle(replace(m, shape=place), bundle.kappa).placed())
-    good = (seen[:, points].sum(axis=0) > 1) & (np.linalg.norm(place - middle, axis=0) < FAR * usual)
+    good = (seen[:, points].sum(axis=0) > (0 if flat else 1)) & (np.linalg.norm(place - middle, axis=0) < FAR * usual)
     good &= np.where(seen[:, points], far, 1.0).min(axis=0) > NEAR
     shape = beside_others(W, seen, bundle, points)
     shape[:, points] = np.where(good, place, shape[:, points])

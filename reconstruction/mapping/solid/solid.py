@@ -71,7 +71,7 @@ def bundle_adjust(
         known: a shape (3, p) of any size that it may be, to start from as well.
 
     Raises:
-        ReconstructionError: fewer than 3 keyframes, or 6 points seen often enough.
+        ReconstructionError: fewer than 3 keyframes, or 6 points seen often enough; or nothing rigid is seen like that.
     """
     if len(W) < FEWEST_VIEWS or (visible.sum(axis=0) >= FEWEST_VIEWS).sum() < FEWEST_POINTS:
         raise ReconstructionError(f"a solid needs {FEWEST_POINTS} points seen in {FEWEST_VIEWS} keyframes or more")
@@ -94,6 +94,8 @@ def bundle_adjust(
     found = [build.settled(one, refine=refine_focal) for one in [*both_ways, *map(build.grown, starts)]]
     k = int(np.argmin([energy for _, energy in found]))
     best, energy = found[k]
+    if not np.isfinite(energy):
+        raise ReconstructionError("no rigid shape lies in front of the camera in all keyframes")
     if build.kappa and k >= len(both_ways):
         other, its_energy = build.settled(best.reversed(), refine=refine_focal)
         best = other if its_energy < energy else best

@@ -7,9 +7,10 @@ from hypothesis import given, settings
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
 from reconstruction.mapping.solid.building import Build
+from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.placing import located
 from reconstruction.mapping.solid.solid import bundle_adjust
-from tests.reconstruction.world import CAMERAS, ORTHOGRAPHIC, PERSPECTIVE, SEEDS, relief, seen, shape_error, turns
+from tests.reconstruction.world import CAMERAS, ORTHOGRAPHIC, PERSPECTIVE, SEEDS, flat, relief, seen, shape_error, turns
 
 VIEWS = 24
 
@@ -79,7 +80,7 @@ def test_new_points_are_located(rng: np.random.Generator, camera: Camera) -> Non
     bundle, _ = min((views.settled(one, refine=False) for one in views.factorized()), key=lambda one: one[1])
     true, new = bundle.motion.shape.copy(), np.isin(np.arange(60), [7, 20, 40])
     lost = RigidMotion(np.where(new, 30.0, true), bundle.motion.R, bundle.motion.s, bundle.motion.t)
-    found = located(views.W, views.h, type(bundle)(lost, bundle.kappa), new)
+    found = located(views.W, views.h, type(bundle)(lost, bundle.kappa), new, flat=False)
     np.testing.assert_array_equal(found.motion.shape[:, ~new], true[:, ~new])
     np.testing.assert_allclose(found.motion.shape[:, [20, 40]], true[:, [20, 40]], atol=1e-3)
     np.testing.assert_allclose(found.image()[0][:, 7], views.W[0][:, 7], atol=1e-9)  # where it is seen, ...
@@ -93,4 +94,20 @@ def test_points_without_any_view_stay() -> None:
     _, views = build(np.random.default_rng(1), PERSPECTIVE, visible)
     bundle = views.factorized()[0]
     before = bundle.motion.shape[:, 3].copy()
-    np.testing.assert_array_equal(located(views.W, views.h, bundle, ~visible.any(axis=0)).motion.shape[:, 3], before)
+    found = located(views.W, views.h, bundle, ~visible.any(axis=0), flat=False)
+    np.testing.assert_array_equal(found.motion.shape[:, 3], before)
+
+
+@given(SEEDS, CAMERAS)
+@settings(max_examples=5, deadline=None)
+def test_points_of_a_plane_are_located_on_it_by_one_view(rng: np.random.Generator, camera: Camera) -> None:
+    still = flat(rng, 60)
+    W, _ = seen(np.repeat(still[None], VIEWS, axis=0), turns(VIEWS), camera)
+    visible = np.ones((VIEWS, 60), bool)
+    visible[1:, 7] = False
+    whole = bundle_adjust(W, np.ones_like(visible), camera, refine_focal=False, flat=True).motion
+    new = np.isin(np.arange(60), [7, 20])
+    lost = RigidMotion(np.where(new, 30.0, whole.shape), whole.R, whole.s, whole.t)
+    W = W - camera.center_px[:, None]
+    found = located(W, visible.astype(float), Bundle(lost, 1 / camera.focal_px), new, flat=True)
+    np.testing.assert_allclose(found.motion.shape, whole.shape, atol=0.05)

@@ -10,7 +10,7 @@ from reconstruction.camera import Camera
 from reconstruction.evaluation import with_missing, with_outliers
 from reconstruction.mapping.solid.placing import MOST_POINTS, well_spread
 from reconstruction.mapping.solid.solid import bundle_adjust
-from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, relief, seen, shape_error, turns
+from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, flat, relief, seen, shape_error, turns
 
 KEYFRAMES, POINTS = 14, 120
 
@@ -88,6 +88,19 @@ def test_a_still_object_has_no_deep_relief():
 def test_a_plane_stays_one_if_asked():
     _, W, visible = views(np.random.default_rng(2), PERSPECTIVE)
     assert bundle_adjust(W, visible, PERSPECTIVE, flat=True).relief < 0.01
+
+
+@pytest.mark.parametrize("seed", range(4, 8))
+def test_a_plane_is_found_though_points_that_come_late_are_not_on_it(seed):
+    rng = np.random.default_rng(seed)
+    W, _ = seen(np.repeat(flat(rng, POINTS)[None], 24, axis=0), turns(24, 4.0), PERSPECTIVE)
+    W += 0.5 * rng.normal(size=W.shape)
+    visible, late = np.ones((24, POINTS), bool), rng.choice(POINTS, POINTS // 4, replace=False)
+    visible[:16, late] = False
+    W[16:, :, late] += 40 * rng.normal(size=(2, len(late))) * np.linspace(-1, 1, 8)[:, None, None]
+    found = bundle_adjust(W, visible, PERSPECTIVE, refine_focal=False, flat=True)
+    assert found.relief < 0.01
+    assert found.frame_residuals_px.max() < 1.0
 
 
 def test_large_turns_come_back_from_views_out_of_order():
