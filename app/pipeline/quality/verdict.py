@@ -42,7 +42,7 @@ OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and sh
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 SURELY = 2.4  # sureness of a sheet that nothing turns: cloth that stretches has up to 2.1, rolled paper 2.7 and more
-MOSTLY = 2.4  # times what a solid leaves over a plane must, if it hardly turns: rigid ones, turned by 8°, have 2.9 and more
+MOSTLY = 2.4  # times what a solid leaves over a plane must: rigid ones, turned by 8°, have 2.9 and more, limbs up to 1.5
 RECOVERED = ("rigid", "plane")  # by the first frames
 BY_KEYFRAMES = {"isometric": "sheet", "rigid": "solid", "plane": "flat sheet"}  # kinds of rest shapes, in words
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
@@ -218,6 +218,9 @@ def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
     radius_px = float(np.median(motion.s)) * rms_radius(motion.shape)  # in the images: the shape may have any size
     whole, edges = np.array([evidence.solid.whole_px, evidence.solid.edges_px]) / radius_px
     turn = evidence.turn_degrees
+    if turn >= HARDLY_TURNED and evidence.flat.whole_px < MOSTLY * evidence.solid.whole_px:
+        told = "a plane would leave hardly more over, so how deep it is is a guess"
+        yield Verdict("fair", f"{told}; draw the region tightly, film it turning more than it changes")
     depth = np.sqrt(max(whole**2 - edges**2, 0.0)) / np.sin(np.radians(np.clip(turn, 1.0, 90.0)))
     if depth > FAIR_DEPTH or whole > FAIR_CHANGE:
         told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"

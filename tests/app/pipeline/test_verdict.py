@@ -105,7 +105,8 @@ def test_a_flat_sheet_may_as_well_be_a_solid_without_relief(sheet_px: float, sol
          "and turns less", "too much", "is no solid"],
 )  # fmt: skip
 def test_the_depth_of_a_solid_that_changes(whole_px: float, edges_px: float, turn_degrees: float, grade: str) -> None:
-    seen = replace(EVIDENCE, solid=Misfit(edges_px, whole_px), turn_degrees=turn_degrees)
+    plane = EVIDENCE.flat if turn_degrees < 25.0 else Misfit(20.0, 20.0)
+    seen = replace(EVIDENCE, flat=plane, solid=Misfit(edges_px, whole_px), turn_degrees=turn_degrees)
     for size in (1.0, 5.0):  # of another model, as large as the one before
         said = verdict(course([0.001] * 50), replace(SOLID, evidence=seen).scaled(size))
         assert said.grade == grade
@@ -143,6 +144,14 @@ def test_what_deforms_may_seem_to_turn() -> None:
     said = verdict(course([0.003] * 50), replace(deforms, evidence=hardly))
     assert said.grade == "fair"
     assert "turned by 14° alone" in said.reason
+
+
+@pytest.mark.parametrize(("flat_px", "grade"), [(0.6, "fair"), (0.8, "good")])
+def test_a_solid_that_explains_hardly_more_than_a_plane(flat_px: float, grade: str) -> None:
+    evidence = replace(EVIDENCE, flat=Misfit(flat_px, flat_px), turn_degrees=60.0)
+    said = verdict(course([0.001] * 50), replace(SOLID, evidence=evidence))
+    assert said.grade == grade
+    assert ("a plane would leave hardly more" in said.reason) == (grade == "fair")
 
 
 @pytest.mark.parametrize(("turning", "grade"), [(0.6, "good"), (0.85, "fair")])
