@@ -18,7 +18,7 @@ from app.options.evaluate import Evaluate
 from app.options.model import Model
 from app.options.run import Output, Run
 from app.pipeline.evaluate import evaluate
-from app.pipeline.quality.verdict import GRADES
+from app.pipeline.quality.finding import GRADES
 from app.pipeline.session import Session
 from app.reproduce.part import Part
 from app.reproduce.result import markdown_table
@@ -111,7 +111,7 @@ def page(cases: list[Case]) -> str:
         (case.name, 100 * case.words["e3d"], over_sigma(case), case.words["verdict"], case.words["verdict_reason"])
         for case in scores
     ]
-    rule = Path("app/pipeline/quality/verdict.py")
+    rule = Path("app/pipeline/quality")
     return "\n".join(
         [
             "# What a verdict is worth\n",

@@ -24,6 +24,7 @@ from reconstruction.settings import Deformation, Metric, Settings
 from reconstruction.window import priors
 from reconstruction.window.energy import build_energy, build_guide
 from reconstruction.window.priors import Weights
+from reconstruction.window.uncertainty.uncertainty import Uncertainty
 from reconstruction.window.window import SlidingWindow
 
 
@@ -234,6 +235,7 @@ class Reconstruction:
         pull = None if found.deformations is None else found.deformations.pull(model.B.shape[1])
         energy = build_energy(model, self.deformation, self.settings.priors, paper=paper, pull=pull)
         keeps_lengths = self.deformation in ("bending", "inextensible")
+        by_focal = found.sheet.by_focal if found.sheet else 0.0
         refine = self.settings.refine_rest and keeps_lengths and not paper and found.sheet is None
         self.window = SlidingWindow(
             model,
@@ -242,7 +244,7 @@ class Reconstruction:
             found.rest.motion,
             refine=refine,
             guide=build_guide(model, self.deformation, paper=paper),
-            uncertainty=self.settings.uncertainty,
+            uncertainty=Uncertainty(model, by_focal) if self.settings.uncertainty else None,
         )
         if before is not None and last is not None:
             self.window.frames, self.window.state = before.frames, found.state_of(model, last.shape)

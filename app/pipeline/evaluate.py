@@ -13,7 +13,8 @@ from app.files.writing import check_outputs
 from app.options.evaluate import Evaluate
 from app.pipeline.estimates import Collected, Scores, save_shapes, sigmas
 from app.pipeline.prepare import settings_of
-from app.pipeline.quality.verdict import Grade, verdict
+from app.pipeline.quality.finding import Grade
+from app.pipeline.quality.verdict import verdict
 from app.pipeline.stages.messages import RECOVERED
 from app.pipeline.summary import KINDS
 from app.terminal.errors import UsageError

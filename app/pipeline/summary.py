@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Literal
 
 from app.pipeline.estimates import Scores
-from app.pipeline.quality.verdict import BY_KEYFRAMES, Grade, verdict
+from app.pipeline.quality.finding import Grade
+from app.pipeline.quality.keyframes import BY_KEYFRAMES
+from app.pipeline.quality.verdict import verdict
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
 from app.terminal.exit_code import ExitCode

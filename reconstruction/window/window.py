@@ -46,7 +46,7 @@ class SlidingWindow:
         refine: whether frames that leave the window refine the rest shape.
         guide: an energy to be minimised before `energy` where that alone might end on the wrong branch (`build_guide`).
             The window is then adjusted by it; only the newest frame, before it is shown, by `energy`.
-        uncertainty: whether estimates have standard deviations.
+        uncertainty: gives estimates standard deviations.
 
     Attributes:
         state: the window's frames; None before the first.
@@ -62,7 +62,7 @@ class SlidingWindow:
         *,
         refine: bool = False,
         guide: Energy | None = None,
-        uncertainty: bool = False,
+        uncertainty: Uncertainty | None = None,
     ) -> None:
         self.model = model
         self.state: State | None = None
@@ -79,7 +79,7 @@ class SlidingWindow:
         self._rest = Refinement(len(model.basis.eigenvalues))
         self._refine = refine
         self._switch: Switch | None = None  # of the newest frame
-        self._uncertainty = Uncertainty(model) if uncertainty else None
+        self._uncertainty = uncertainty
 
     def advance(self, W: Array, visible: Mask, expected: State | None = None) -> ShapeEstimate:
         """Add the next frame's points (2, p) px and adjust the window; returns the newest frame's shape.

@@ -136,7 +136,8 @@ def refined(found: IsometricSheet, W: Array, visible: Mask) -> IsometricSheet:
     c = found.coefficients @ found.values[nodes.points].T @ np.linalg.pinv(B).T
     c, factor = once_more(seen, seen, c, field.stiffness)
     c, factor = again(nodes, seen, seen.weighted(factor), c, B, field.stiffness, found.camera)
-    return described(warps, nodes, field, values, c, factor, found.camera, found.bend, FINE_SHAPES)
+    finer_one = described(warps, nodes, field, values, c, factor, found.camera, found.bend, FINE_SHAPES)
+    return replace(finer_one, by_focal=found.by_focal)
 
 
 def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:

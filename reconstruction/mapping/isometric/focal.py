@@ -1,6 +1,7 @@
 """The focal length under which a sheet keeps its lengths best."""
 
 from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +20,8 @@ AGAIN = 3  # times at most a sheet is made anew
 FRAMES = 15  # those that differ most tell it roughly
 EXACT = 1e-9  # change of length that is none
 WELL = 0.003  # change of lengths: less is not to be had
+UNSURE = 0.8  # deviation of the logarithm of a focal length, times the bend of the logarithm of the change by it
+GUESS = 0.35  # the same of lenses there are
 ENOUGH = 1.1 * RISE  # ... and beyond which no focal length is tried on that side
 
 
@@ -50,7 +53,7 @@ def under_its_focal_length(assumed: IsometricSheet) -> IsometricSheet:
     # A long lens shows so little perspective that a longer one changes hardly anything: the one assumed does.
     less = both_sides or typical_strain(assumed) > LESS * typical_strain(found)
     known = less and FACTORS[0] < found.camera.focal_px / assumed.camera.focal_px < FACTORS[-1]
-    return found if known else assumed
+    return found if known else replace(assumed, by_focal=found.by_focal)
 
 
 def roughly(sheet: IsometricSheet) -> tuple[float, bool]:
@@ -90,10 +93,22 @@ def closer(made: IsometricSheet) -> IsometricSheet:
             found[k] = with_focal(found[k - int(np.sign(k))], made.camera.focal_px * CLOSER**k)
             change[k] = np.log(typical_strain(found[k]))
     bend, slope, _ = np.polyfit(beside, [change[k] for k in beside], 2)
+    step = np.log(CLOSER)
+    surely = np.hypot(max(bend, 0.0) / (UNSURE * step**2), 1 / GUESS)
+    by_focal = apart(found[best - 1], found[best + 1]) / (2 * step * surely)
     if bend <= 0:
-        return found[best]
+        return replace(found[best], by_focal=by_focal)
     lowest = np.clip(-slope / (2 * bend), beside[0], beside[-1])
-    return with_focal(found[best], float(made.camera.focal_px * CLOSER**lowest))
+    return replace(with_focal(found[best], float(made.camera.focal_px * CLOSER**lowest)), by_focal=by_focal)
+
+
+def apart(one: IsometricSheet, other: IsometricSheet) -> float:
+    """How far the shapes of two sheets in the same frames are apart, RMS over their size, in the median frame."""
+    shapes = np.stack([one.shapes(), other.shapes()])
+    shapes = shapes[..., np.isfinite(shapes).all(axis=(0, 1, 2))]
+    shapes = shapes - shapes.mean(axis=3, keepdims=True)
+    a, b = shapes / np.sqrt((shapes**2).sum(axis=(2, 3), keepdims=True))
+    return float(np.median(np.sqrt(((a - b) ** 2).sum(axis=(1, 2)))))
 
 
 def made_anew(found: IsometricSheet) -> IsometricSheet:

@@ -38,6 +38,7 @@ class IsometricSheet:
         bend: weight λ of bending that the depths were found with.
         shape_functions: R, of the functions of the images, that bundled shapes are made of.
         camera: the camera.
+        by_focal: how far shapes may be off since the focal length was looked for, RMS over their size; 0 if it is given.
     """
 
     warps: Warps
@@ -52,6 +53,7 @@ class IsometricSheet:
     bend: float
     shape_functions: int
     camera: Camera
+    by_focal: float = 0.0
 
     @property
     def strain_rms(self) -> float:

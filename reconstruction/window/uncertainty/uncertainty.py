@@ -14,6 +14,8 @@ Neighbours' residuals are alike, since most of them is what the modes leave out:
 variance of their sums in small patches, in units of that of independent ones. What the modes leave out is missing from the
 vertices, too (`variances.left_out`). Where deformations are known (`energy.Pull`), τ_k is the noise they were learned with.
 
+Where the focal length was looked for, it makes all vertices as unsure as it makes the shape (`mapping.isometric.focal`).
+
 Neighbouring frames count for nothing, since their errors are alike, too. The rest shape is taken as exact, and so is the
 side to which it bends: before an orthographic camera the mirror image may be the truth.
 """
@@ -42,10 +44,11 @@ class Uncertainty:
 
     Args:
         model: the rest shape and its modes.
+        by_focal: how far shapes may be off by the focal length, over their size.
     """
 
-    def __init__(self, model: Model) -> None:
-        self._model = model
+    def __init__(self, model: Model, by_focal: float = 0.0) -> None:
+        self._model, self._by_focal = model, by_focal
         self._modes = len(model.basis.eigenvalues)
         places = model.B[:3].T
         self._patch = patches(places, PATCHES_PER_MODE * self._modes)
@@ -83,7 +86,7 @@ class Uncertainty:
         moved = self._derivatives(energy, state) @ (axes * np.sqrt(spread.clip(0.0)))
         missing = left_out(state.Lambda[0] - energy.centre, state, residuals, weights, self._nearest)
         unit = self._model.radius if self._model.camera.perspective else self._model.radius_px * size
-        return np.asarray(unit * np.sqrt((moved**2).sum(axis=(0, 2)) + missing))
+        return np.asarray(unit * np.sqrt((moved**2).sum(axis=(0, 2)) + missing + self._by_focal**2))
 
     def _independent_edges(self, energy: Energy, state: State) -> float:
         """As how many edges those whose lengths are kept count."""

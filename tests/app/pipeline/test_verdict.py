@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from app.pipeline.quality.course import Course
-from app.pipeline.quality.verdict import longest, verdict
+from app.pipeline.quality.frames import longest
+from app.pipeline.quality.verdict import verdict
 from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.sheet import IsometricSheet
@@ -128,6 +129,7 @@ class Sheet:
     stretch: float = 0.003
     strain_rms: float = 0.004
     points: int = 100
+    by_focal: float = 0.0
 
     @property
     def warps(self) -> SimpleNamespace:
@@ -180,6 +182,7 @@ def test_a_sheet_that_stretches_while_nothing_turns_may_be_anything() -> None:
         (Sheet(stretch=0.008), 500.0, "fair", "change by 0.8%"),
         (Sheet(stretch=0.008, strain_rms=0.02), 500.0, "poor", "change by 2.0%"),
         (Sheet(points=25), 500.0, "fair", "25 points"),
+        (Sheet(by_focal=0.032), 500.0, "fair", "off by 3.2%"),
     ],
 )
 def test_a_sheet_by_its_lengths_points_and_camera(sheet: Sheet, focal_px: float, grade: str, says: str) -> None:

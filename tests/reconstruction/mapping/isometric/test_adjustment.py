@@ -141,6 +141,16 @@ def test_lengths_hold_the_focal_length(off: float) -> None:
     assert error(found, S) < 0.02
 
 
+def test_fewer_views_tell_less_of_the_focal_length() -> None:
+    W, _, given = waving()
+    all_of_them, few = (
+        under_its_focal_length(sheet(W[:n], SEEN[:n], replace(CAMERA, focal_px=1.25 * CAMERA.focal_px))) for n in (12, 5)
+    )
+    assert given.by_focal == 0.0
+    assert 0.0 < 1.5 * all_of_them.by_focal < few.by_focal < 0.025
+    assert bundled(few, W[:5], rounds=1).by_focal == few.by_focal
+
+
 def test_what_cannot_be_done_is_said() -> None:
     W, _, _ = waving()
     with pytest.raises(ReconstructionError, match="perspective"):

@@ -7,8 +7,12 @@ import pytest
 
 from reconstruction.camera import Camera
 from reconstruction.evaluation import error_over_sigma
+from reconstruction.state import State
+from reconstruction.window.energy import build_energy
+from reconstruction.window.statistics import image_statistics, stack
+from reconstruction.window.uncertainty.uncertainty import Uncertainty
 from tests.reconstruction.runs import SETTINGS, reconstruct, shapes_of, swelling_hill
-from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, bending_sheet
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, bending_sheet, model_of, relief, seen
 
 UNSURE = replace(SETTINGS, uncertainty=True)
 
@@ -32,15 +36,28 @@ def test_what_is_hidden_is_less_sure() -> None:
     W, truth = swelling_hill()
     W, visible = noisy(W, 0.3), np.ones((len(W), W.shape[2]), bool)
     left = truth[0, 0] < np.quantile(truth[0, 0], 0.3)
-    seen = reconstruct(W, PERSPECTIVE, UNSURE, truth, visible)[1][-1].sigma
+    shown = reconstruct(W, PERSPECTIVE, UNSURE, truth, visible)[1][-1].sigma
     visible[18:, left] = False
     hidden = reconstruct(W, PERSPECTIVE, UNSURE, truth, visible)[1][-1].sigma
-    assert seen is not None
+    assert shown is not None
     assert hidden is not None
-    assert (hidden / seen)[left].mean() > 1.1 * (hidden / seen)[~left].mean()
+    assert (hidden / shown)[left].mean() > 1.1 * (hidden / shown)[~left].mean()
     visible[20] = False
     _, estimates = reconstruct(W, PERSPECTIVE, UNSURE, truth, visible)
     assert all(e.sigma is not None and np.isfinite(e.sigma).all() for e in estimates)
+
+
+def test_a_focal_length_that_was_looked_for_makes_all_of_it_less_sure() -> None:
+    rng = np.random.default_rng(0)
+    shape = relief(rng, 60)
+    model = model_of(shape, PERSPECTIVE, 8)
+    W, _ = seen(shape[None], np.eye(3)[None], PERSPECTIVE)
+    W, visible = noisy(W, 0.5)[0], np.ones(60, bool)
+    state = State(np.array([[1.0, 0, 0, 0]]), np.zeros((1, 2)), np.zeros(1), 0.01 * rng.normal(size=(1, 3, 8)))
+    data = stack([image_statistics(model, W, np.ones(60))])
+    energy = build_energy(model, "general", {})
+    given, found = (Uncertainty(model, by).sigma(energy, data, state, W, visible) for by in (0.0, 0.03))
+    np.testing.assert_allclose(found**2 - given**2, (0.03 * model.radius) ** 2)
 
 
 def test_it_takes_the_units_of_the_shape() -> None:

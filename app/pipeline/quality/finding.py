@@ -1,0 +1,25 @@
+"""What a part of a verdict says: a word, the reason, and what helps."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+Grade = Literal["good", "fair", "poor"]
+GRADES: tuple[Grade, ...] = ("poor", "fair", "good")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A word, the reason, and what helps."""
+
+    grade: Grade
+    reason: str
+
+    @property
+    def line(self) -> str:
+        """`poor: 4.5 px from frame 115 on; …`."""
+        return f"{self.grade}: {self.reason}"
+
+
+def limits(poor: float, fair: float) -> list[tuple[Grade, float]]:
+    """The grades that are not good, worst first, and what separates them from the better ones."""
+    return [("poor", poor), ("fair", fair)]

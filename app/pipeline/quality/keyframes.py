@@ -1,0 +1,129 @@
+"""What keyframes say of a reconstruction: whether its kind, its depth and its lengths are to be trusted."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from app.pipeline.quality.finding import Grade, Verdict
+from reconstruction.basis.rest_shape import RigidMotion, rms_radius
+from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
+from reconstruction.mapping.map import FEWEST_POINTS, Map
+from reconstruction.mapping.selection import PLAIN, Evidence
+from reconstruction.mapping.solid.rivals import HARDLY_TURNED
+from reconstruction.mapping.solid.solid import relief
+
+FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
+POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
+POOR_LENGTHS = 0.07  # change of them from half to half of the keyframes: sheets have up to 4.5 %, things with limbs 8 %
+TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
+# What a rigid shape leaves over and neighbours share, which is no noise, over its radius and the sine of its turn: as much
+# its depth may be off, and more.
+FAIR_DEPTH = 0.0125
+FAIR_CHANGE, POOR_CHANGE = 0.028, 0.04  # the same with noise, over the radius alone: what changes is no longer small
+WITH_TURN = 0.7  # share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85
+OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
+OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
+BY_FOCAL = 0.025  # of its size, that shapes may be off by a focal length that was looked for
+SURELY = 2.4  # sureness of a sheet that nothing turns: cloth that stretches has up to 2.1, rolled paper 2.7 and more
+MOSTLY = 2.4  # times what a solid leaves over a plane must: rigid ones, turned by 8°, have 2.9 and more, limbs up to 1.5
+RECOVERED = ("rigid", "plane")  # by the first frames
+BY_KEYFRAMES = {"isometric": "sheet", "rigid": "solid", "plane": "flat sheet"}  # kinds of rest shapes, in words
+
+MIRRORED = Verdict(
+    "fair",
+    "without perspective a bend and its mirror image look alike, so some frames may bend the other way; "
+    "give the camera: K in the file, or --focal",
+)
+
+
+def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
+    """What keyframes say; that there are none goes without saying where something worse is known."""
+    count = found.rest.motion.shape.shape[1]
+    if count < FEWEST_POINTS:
+        yield Verdict("fair", f"known by {count} points: what it does between them is a guess; follow more")
+    if found.evidence is None:
+        if found.rest.kind in RECOVERED and not known:
+            told = "only the first frames say what it is, depth may be a guess"
+            yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
+        if found.rest.kind not in RECOVERED and found.rest.flat and not found.camera.perspective:
+            yield MIRRORED
+        return
+    made = BY_KEYFRAMES.get(found.rest.kind)
+    says = "flat sheet" if found.evidence.kind == "flat" else found.evidence.kind
+    if made not in (None, says):
+        grade: Grade = "poor" if found.evidence.sureness > PLAIN else "fair"
+        yield Verdict(grade, f"keyframes say that it is a {says}, not a {made}")
+    if found.evidence.sureness < TOSS_UP and not surely_flat(found.evidence):
+        told = "another kind of thing would leave about as much over, so depth may be a guess"
+        yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
+    if made and found.rest.kind != "plane":
+        yield from of_turn(found, found.evidence)
+    if found.rest.kind == "rigid":
+        yield from of_solid(found.rest.motion, found.evidence)
+        if found.deformations is not None and found.deformations.turning > WITH_TURN:
+            told = f"{found.deformations.turning:.0%} of its changes go with its turn: which is which is a guess"
+            yield Verdict("fair", f"{told}; film it turning while it keeps its shape")
+        rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
+        if rare > MOST_RARE:
+            yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
+    if found.sheet is not None:
+        yield from of_sheet(found.sheet, found.evidence, perspective=found.camera.perspective)
+
+
+def surely_flat(evidence: Evidence) -> bool:
+    """Whether it is flat, and nothing else would leave much less: a solid or sheet that leaves as much is as flat."""
+    flat, solid = evidence.flat, evidence.solid
+    least_px = float(np.nanmin([solid.edges_px, evidence.sheet.edges_px]))
+    as_well = flat.whole_px <= TOSS_UP * solid.whole_px and flat.edges_px <= TOSS_UP * least_px
+    return evidence.kind == "flat" and as_well
+
+
+def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:
+    """What a small turn says: what deforms seems to turn, too."""
+    changes = found.deformations is not None or evidence.flat.whole_px < MOSTLY * evidence.solid.whole_px
+    surely_bends = found.sheet is not None and evidence.sureness > SURELY
+    if evidence.turn_degrees >= HARDLY_TURNED or surely_bends or (evidence.proven and not changes):
+        return
+    told = f"turned by {evidence.turn_degrees:.0f}° alone, it shows hardly more of its depth than of its changes"
+    keeps_lengths = found.sheet is not None and found.sheet.stretch < USUAL_STRETCH
+    grade: Grade = "fair" if evidence.proven or keeps_lengths else "poor"
+    yield Verdict(grade, f"{told}: how deep it is is a guess; film it turning more")
+
+
+def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
+    """What a solid's changes, turn and depth say."""
+    radius_px = float(np.median(motion.s)) * rms_radius(motion.shape)  # in the images: the shape may have any size
+    whole, edges = np.array([evidence.solid.whole_px, evidence.solid.edges_px]) / radius_px
+    turn = evidence.turn_degrees
+    if turn >= HARDLY_TURNED and evidence.flat.whole_px < MOSTLY * evidence.solid.whole_px:
+        told = "a plane would leave hardly more over, so how deep it is is a guess"
+        yield Verdict("fair", f"{told}; draw the region tightly, film it turning more than it changes")
+    depth = np.sqrt(max(whole**2 - edges**2, 0.0)) / np.sin(np.radians(np.clip(turn, 1.0, 90.0)))
+    if depth > FAIR_DEPTH or whole > FAIR_CHANGE:
+        told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
+        yield Verdict("poor" if whole > POOR_CHANGE else "fair", f"{told}; film it turning more")
+    deep, half = relief(motion.shape), evidence.relief
+    if max(deep, half) > OTHERWISE_DEEP * min(deep, half):
+        told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"
+        yield Verdict("fair", f"{told}; film it turning more")
+
+
+def of_sheet(found: IsometricSheet, evidence: Evidence, *, perspective: bool) -> Iterator[Verdict]:
+    """What a sheet's lengths, points and camera say."""
+    if not perspective:
+        yield MIRRORED
+    count = int(np.median((found.warps.weights > 0).sum(axis=1)))
+    if count < FEW_POINTS:
+        yield Verdict("fair", f"a sheet by {count} points a frame: what it does between them is a guess; follow more")
+    if found.strain_rms > POOR_STRAIN:
+        yield Verdict("poor", f"its lengths change by {found.strain_rms:.1%}: no shapes have been found that keep them")
+    elif evidence.length_change > POOR_LENGTHS:
+        told = f"its lengths differ by {evidence.length_change:.0%} from half to half of the keyframes"
+        told += ": it may be no sheet, or it is lost in noise"
+        yield Verdict("poor", f"{told}; draw the region tightly, film it sharper")
+    if found.by_focal > BY_FOCAL:
+        told = f"its focal length is hardly known, which may put shapes off by {found.by_focal:.1%}"
+        yield Verdict("fair", f"{told}; give it by --focal, or film it bending more, from near by")
+    if found.stretch > USUAL_STRETCH:
+        why = f"its lengths change by {found.stretch:.1%}: it stretches, has creases, or fine folds"
+        yield Verdict("fair", f"{why}; if it is a solid: --rest-shape solid")
