@@ -20,7 +20,7 @@ AGAIN = 3  # times at most a sheet is made anew
 FRAMES = 15  # those that differ most tell it roughly
 EXACT = 1e-9  # change of length that is none
 WELL = 0.003  # change of lengths: less is not to be had
-UNSURE = 0.8  # deviation of the logarithm of a focal length, times the bend of the logarithm of the change by it
+UNSURE = 0.6  # deviation of the logarithm of a focal length, times the bend of the logarithm of the change by it
 GUESS = 0.35  # the same of lenses there are
 ENOUGH = 1.1 * RISE  # ... and beyond which no focal length is tried on that side
 
