@@ -83,7 +83,8 @@ def roughly(sheet: IsometricSheet) -> tuple[float, bool]:
 def closer(made: IsometricSheet) -> IsometricSheet:
     """The sheet under the focal length of least change in all frames, near its own.
 
-    The lowest place of a parabola through the logarithm of the change, by that of the focal length.
+    The lowest place of a parabola through the logarithm of the change, by that of the focal length. The less it is bent,
+    the further off both may be (`by_focal`).
     """
     found, change = {0: made}, {0: np.log(typical_strain(made))}
     for _ in range(WALKS):
