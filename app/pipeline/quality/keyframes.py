@@ -53,7 +53,7 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     if made not in (None, says):
         grade: Grade = "poor" if found.evidence.sureness > PLAIN else "fair"
         yield Verdict(grade, f"keyframes say that it is a {says}, not a {made}")
-    if found.evidence.sureness < TOSS_UP and not surely_flat(found.evidence):
+    if toss_up(found.evidence):
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
     if made and found.rest.kind != "plane":
@@ -70,12 +70,13 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         yield from of_sheet(found.sheet, found.evidence, perspective=found.camera.perspective)
 
 
-def surely_flat(evidence: Evidence) -> bool:
-    """Whether it is flat, and nothing else would leave much less: a solid or sheet that leaves as much is as flat."""
+def toss_up(evidence: Evidence) -> bool:
+    """Whether something else may be as true. A solid or sheet that leaves as much over as a plane is as flat: none is."""
+    if evidence.kind != "flat":
+        return evidence.sureness < TOSS_UP
     flat, solid = evidence.flat, evidence.solid
     least_px = float(np.nanmin([solid.edges_px, evidence.sheet.edges_px]))
-    as_well = flat.whole_px <= TOSS_UP * solid.whole_px and flat.edges_px <= TOSS_UP * least_px
-    return evidence.kind == "flat" and as_well
+    return flat.whole_px > TOSS_UP * solid.whole_px or flat.edges_px > TOSS_UP * least_px
 
 
 def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:

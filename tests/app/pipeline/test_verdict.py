@@ -87,11 +87,14 @@ def test_what_may_as_well_be_something_else() -> None:
     assert "depth may be a guess" in said.reason
 
 
+@pytest.mark.parametrize("sureness", [1.05, 1.35])
 @pytest.mark.parametrize(("sheet_px", "solid_px", "grade"), [(0.3, 0.3, "good"), (0.2, 0.3, "fair"), (0.3, 0.2, "fair")])
-def test_a_flat_sheet_may_as_well_be_a_solid_without_relief(sheet_px: float, solid_px: float, grade: str) -> None:
+def test_a_flat_sheet_may_as_well_be_a_solid_without_relief(
+    sheet_px: float, solid_px: float, grade: str, sureness: float
+) -> None:
     rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
     solid, sheet = Misfit(solid_px, solid_px), Misfit(sheet_px, np.nan)
-    known = replace(EVIDENCE, kind="flat", flat=LEFT, solid=solid, sheet=sheet, sureness=1.05)
+    known = replace(EVIDENCE, kind="flat", flat=LEFT, solid=solid, sheet=sheet, sureness=sureness)
     said = verdict(course([0.001] * 50), Map(rest, Camera(), evidence=known))
     assert said.grade == grade
     assert "a flat sheet in many views" in said.reason or grade == "fair"
