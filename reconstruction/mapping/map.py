@@ -200,11 +200,11 @@ def rigid_map(
     """The map of a solid, or of a flat sheet.
 
     Raises:
-        ReconstructionError: there are too few points; or it is flat and hardly turns: first frames tell as much.
+        ReconstructionError: too few points, or some are behind the camera; or flat and hardly turned: first frames do.
     """
     found = bundle_adjust(W, visible, camera, refine_focal=estimate_focal, flat=flat, known=None if flat else known)
-    if flat and found.turn_degrees < HARDLY_TURNED:
-        raise ReconstructionError(f"it turned by {found.turn_degrees:.0f}° alone")
+    if np.isinf(found.energy) or (flat and found.turn_degrees < HARDLY_TURNED):
+        raise ReconstructionError(f"not by these keyframes: {found.note}")
     rest = RestShape("plane" if flat else "rigid", found.motion, f"{found.note}; {evidence.note}")
     modes = USUAL_MODES if flat else modes_held(W, visible, found, MOST_MODES if last else MORE_MODES)
     return Map(rest, found.camera, modes=modes, evidence=evidence)

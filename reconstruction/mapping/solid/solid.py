@@ -30,6 +30,7 @@ class Solid:
         turn_degrees: rotation of the viewing direction covered.
         relief: extent off the shape's main plane over that along it, both RMS.
         note: all that in words.
+        energy: left over an observation; infinite where nothing rigid lies in front of the camera in all keyframes.
     """
 
     motion: RigidMotion
@@ -39,6 +40,7 @@ class Solid:
     turn_degrees: float
     relief: float
     note: str
+    energy: float = 0.0
 
     @property
     def shape(self) -> Array:
@@ -71,7 +73,7 @@ def bundle_adjust(
         known: a shape (3, p) of any size that it may be, to start from as well.
 
     Raises:
-        ReconstructionError: fewer than 3 keyframes, or 6 points seen often enough; or nothing rigid is seen like that.
+        ReconstructionError: fewer than 3 keyframes, or 6 points seen often enough.
     """
     if len(W) < FEWEST_VIEWS or (visible.sum(axis=0) >= FEWEST_VIEWS).sum() < FEWEST_POINTS:
         raise ReconstructionError(f"a solid needs {FEWEST_POINTS} points seen in {FEWEST_VIEWS} keyframes or more")
@@ -94,17 +96,15 @@ def bundle_adjust(
     found = [build.settled(one, refine=refine_focal) for one in [*both_ways, *map(build.grown, starts)]]
     k = int(np.argmin([energy for _, energy in found]))
     best, energy = found[k]
-    if not np.isfinite(energy):
-        raise ReconstructionError("no rigid shape lies in front of the camera in all keyframes")
     if build.kappa and k >= len(both_ways):
         other, its_energy = build.settled(best.reversed(), refine=refine_focal)
-        best = other if its_energy < energy else best
+        best, energy = (other, its_energy) if its_energy < energy else (best, energy)
     bundle = scaled(whole.completed(best, some), unit)
     back = np.argsort(order)
     motion = bundle[back].motion.in_first_frame()
     motion = replace(motion, shape=with_unseen(motion.shape, np.asarray(visible.any(axis=0)), known))
     bundle = Bundle(motion, bundle.kappa)
-    return describe(W, given, bundle, camera, flat=flat)
+    return replace(describe(W, given, bundle, camera, flat=flat), energy=energy)
 
 
 def width(shape: Array) -> float:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from reconstruction.basis.rest_shape import completed, given, medoid
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.solid.solid import Solid, bundle_adjust
 from reconstruction.online import Reconstruction
 from reconstruction.settings import Settings
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
@@ -203,6 +205,19 @@ def test_modes_made_beforehand_are_those_made_in_time(turned_away: bool) -> None
     np.testing.assert_allclose(beforehand.model.basis.rest, in_time.basis.rest)
     span, other = beforehand.model.basis.Upsilon, in_time.basis.Upsilon
     np.testing.assert_allclose(span.T @ span, other.T @ other, atol=1e-6)
+
+
+def test_what_lies_behind_the_camera_is_no_map(monkeypatch: pytest.MonkeyPatch) -> None:
+    shape = relief(np.random.default_rng(3), 120)
+    W, _ = seen(np.repeat(shape[None], 16, axis=0), turns(16), PERSPECTIVE)
+    visible = np.ones((16, 120), bool)
+    assert map_of(W, visible, PERSPECTIVE, estimate_focal=False) is not None
+
+    def behind(*asked: Any, **how: Any) -> Solid:
+        return replace(bundle_adjust(*asked, **how), energy=np.inf)
+
+    monkeypatch.setattr("reconstruction.mapping.map.bundle_adjust", behind)
+    assert map_of(W, visible, PERSPECTIVE, estimate_focal=False) is None
 
 
 def test_too_few_keyframes_tell_nothing() -> None:
