@@ -18,8 +18,3 @@ class Verdict:
     def line(self) -> str:
         """`poor: 4.5 px from frame 115 on; …`."""
         return f"{self.grade}: {self.reason}"
-
-
-def limits(poor: float, fair: float) -> list[tuple[Grade, float]]:
-    """The grades that are not good, worst first, and what separates them from the better ones."""
-    return [("poor", poor), ("fair", fair)]

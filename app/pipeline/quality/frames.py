@@ -7,7 +7,7 @@ import numpy as np
 
 from app.arrays import Flags
 from app.pipeline.quality.course import Course
-from app.pipeline.quality.finding import Verdict, limits
+from app.pipeline.quality.finding import Grade, Verdict
 from app.pipeline.quality.keyframes import RECOVERED
 from reconstruction.mapping.map import Map
 
@@ -20,6 +20,11 @@ POOR_GUESS = 0.005
 FAIR_SHARE, POOR_SHARE = 0.5, 0.3
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
+
+
+def limits(poor: float, fair: float) -> list[tuple[Grade, float]]:
+    """The grades that are not good, worst first, and what separates them from the better ones."""
+    return [("poor", poor), ("fair", fair)]
 
 
 def errors(course: Course, found: Map) -> Iterator[Verdict]:

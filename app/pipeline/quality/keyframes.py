@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.pipeline.quality.finding import Grade, Verdict
-from reconstruction.basis.rest_shape import RigidMotion, rms_radius
+from reconstruction.basis.rest_shape import rms_radius
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
 from reconstruction.mapping.selection import PLAIN, Evidence
@@ -59,13 +59,7 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     if made and found.rest.kind != "plane":
         yield from of_turn(found, found.evidence)
     if found.rest.kind == "rigid":
-        yield from of_solid(found.rest.motion, found.evidence)
-        if found.deformations is not None and found.deformations.turning > WITH_TURN:
-            told = f"{found.deformations.turning:.0%} of its changes go with its turn: which is which is a guess"
-            yield Verdict("fair", f"{told}; film it turning while it keeps its shape")
-        rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
-        if rare > MOST_RARE:
-            yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
+        yield from of_solid(found, found.evidence)
     if found.sheet is not None:
         yield from of_sheet(found.sheet, found.evidence, perspective=found.camera.perspective)
 
@@ -81,7 +75,7 @@ def toss_up(evidence: Evidence) -> bool:
 
 def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     """What a small turn says: what deforms seems to turn, too."""
-    changes = found.deformations is not None or evidence.flat.whole_px < MOSTLY * evidence.solid.whole_px
+    changes = found.deformations is not None or hardly_more_than_a_plane(evidence)
     surely_bends = found.sheet is not None and evidence.sureness > SURELY
     if evidence.turn_degrees >= HARDLY_TURNED or surely_bends or (evidence.proven and not changes):
         return
@@ -91,12 +85,18 @@ def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     yield Verdict(grade, f"{told}: how deep it is is a guess; film it turning more")
 
 
-def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
-    """What a solid's changes, turn and depth say."""
+def hardly_more_than_a_plane(evidence: Evidence) -> bool:
+    """Whether a plane leaves hardly more over than a solid does."""
+    return evidence.flat.whole_px < MOSTLY * evidence.solid.whole_px
+
+
+def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
+    """What a solid's changes, turn, depth and points say."""
+    motion = found.rest.motion
     radius_px = float(np.median(motion.s)) * rms_radius(motion.shape)  # in the images: the shape may have any size
     whole, edges = np.array([evidence.solid.whole_px, evidence.solid.edges_px]) / radius_px
     turn = evidence.turn_degrees
-    if turn >= HARDLY_TURNED and evidence.flat.whole_px < MOSTLY * evidence.solid.whole_px:
+    if turn >= HARDLY_TURNED and hardly_more_than_a_plane(evidence):
         told = "a plane would leave hardly more over, so how deep it is is a guess"
         yield Verdict("fair", f"{told}; draw the region tightly, film it turning more than it changes")
     depth = np.sqrt(max(whole**2 - edges**2, 0.0)) / np.sin(np.radians(np.clip(turn, 1.0, 90.0)))
@@ -107,6 +107,12 @@ def of_solid(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
     if max(deep, half) > OTHERWISE_DEEP * min(deep, half):
         told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"
         yield Verdict("fair", f"{told}; film it turning more")
+    if found.deformations is not None and found.deformations.turning > WITH_TURN:
+        told = f"{found.deformations.turning:.0%} of its changes go with its turn: which is which is a guess"
+        yield Verdict("fair", f"{told}; film it turning while it keeps its shape")
+    rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
+    if rare > MOST_RARE:
+        yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
 
 
 def of_sheet(found: IsometricSheet, evidence: Evidence, *, perspective: bool) -> Iterator[Verdict]:

@@ -97,10 +97,11 @@ def closer(made: IsometricSheet) -> IsometricSheet:
     step = np.log(CLOSER)
     surely = np.hypot(max(bend, 0.0) / (UNSURE * step**2), 1 / GUESS)
     by_focal = apart(found[best - 1], found[best + 1]) / (2 * step * surely)
-    if bend <= 0:
-        return replace(found[best], by_focal=by_focal)
-    lowest = np.clip(-slope / (2 * bend), beside[0], beside[-1])
-    return replace(with_focal(found[best], float(made.camera.focal_px * CLOSER**lowest)), by_focal=by_focal)
+    least = found[best]
+    if bend > 0:
+        lowest = np.clip(-slope / (2 * bend), beside[0], beside[-1])
+        least = with_focal(least, float(made.camera.focal_px * CLOSER**lowest))
+    return replace(least, by_focal=by_focal)
 
 
 def apart(one: IsometricSheet, other: IsometricSheet) -> float:

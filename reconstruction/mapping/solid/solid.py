@@ -40,7 +40,7 @@ class Solid:
     turn_degrees: float
     relief: float
     note: str
-    energy: float = 0.0
+    energy: float
 
     @property
     def shape(self) -> Array:
@@ -104,7 +104,7 @@ def bundle_adjust(
     motion = bundle[back].motion.in_first_frame()
     motion = replace(motion, shape=with_unseen(motion.shape, np.asarray(visible.any(axis=0)), known))
     bundle = Bundle(motion, bundle.kappa)
-    return replace(describe(W, given, bundle, camera, flat=flat), energy=energy)
+    return describe(W, given, bundle, camera, flat=flat, energy=energy)
 
 
 def width(shape: Array) -> float:
@@ -118,7 +118,7 @@ def relief(shape: Array) -> float:
     return float(np.sqrt(np.linalg.eigvalsh(np.cov(shape, bias=True))[0].clip(0))) / width(shape)
 
 
-def describe(W: Array, visible: Mask, bundle: Bundle, camera: Camera, *, flat: bool) -> Solid:
+def describe(W: Array, visible: Mask, bundle: Bundle, camera: Camera, *, flat: bool, energy: float) -> Solid:
     """The solid of a bundle in pixels, its spikes smoothed; W and bundle relative to the principal point."""
     residual = np.where(visible, np.linalg.norm(bundle.image() - W, axis=1), np.nan)
     focal = 1 / bundle.kappa if bundle.kappa else np.inf
@@ -130,4 +130,4 @@ def describe(W: Array, visible: Mask, bundle: Bundle, camera: Camera, *, flat: b
     note += f", relief {depth:.2f} of the width"
     if turn < TURN_DEGREES:
         note += f" (hardly turned: relief beyond {HALF_WIDTH:g} is not believed without proof)"
-    return Solid(motion, replace(camera, focal_px=focal), residual, trusted, turn, depth, note)
+    return Solid(motion, replace(camera, focal_px=focal), residual, trusted, turn, depth, note, energy)
