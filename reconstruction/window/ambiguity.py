@@ -12,6 +12,7 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import (
+    nearest_rotation,
     quaternion_exp,
     quaternion_from_rotation,
     quaternion_product,
@@ -25,6 +26,8 @@ from reconstruction.window.statistics import image_statistics
 
 FACING = 0.05  # radians within which a shape's main plane faces the camera
 LEAN = 0.1  # radians by which it is tilted then
+FLAT = 0.05  # share of a shape's extent along its main axis, below which an affine view of it tells no slope
+CLEARLY_BETTER = 0.5  # times the energy of the pose at the start
 OTHER_BENDS = (np.zeros((3, 1)), np.array([[1.0], [1.0], [-1.0]]))  # factors on the rows of Λ: undeformed, bent back
 
 
@@ -40,7 +43,9 @@ def switch_between(left: Solution, found: Solution) -> Switch | None:
 
 
 def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask) -> State:
-    """Pose of the first frame with nothing deformed, r = 0, from that of the bootstrap.
+    """Pose of the first frame with nothing deformed, r = 0: from that of the bootstrap, or as its image is nearest to.
+
+    The latter where that explains the image clearly better: a solid that was lost may have turned to anywhere.
 
     Args:
         model: the rest shape and its modes.
@@ -48,14 +53,20 @@ def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask) -> St
         W: (2, p) px.
         visible: (p,) which points to use.
     """
-    shape = motion.shape
     data = image_statistics(model, W, visible.astype(np.float64), rigid=True)
-    seen = W[:, visible] - model.camera.center_px[:, None]
-    extent = np.var((motion.R[0] @ shape)[:2, visible], axis=1).sum()
-    log_s = np.log(np.sqrt(np.var(seen, axis=1).sum() / extent) / model.scale)
-    q = quaternion_from_rotation(motion.R[0] @ model.basis.Phi)
-    start = State(q[None], seen.mean(axis=1)[None] / model.radius_px, np.array([log_s]), np.zeros((1, 3, 0)))
-    return minimise(pose_energy(model.camera), data, start, None, Solver()).state
+    shape, seen = motion.shape[:, visible], W[:, visible] - model.camera.center_px[:, None]
+    centre = seen.mean(axis=1, keepdims=True)
+    nearest = (seen - centre) @ np.linalg.pinv(shape - shape.mean(axis=1, keepdims=True), rcond=FLAT)  # affine resection
+    best: Solution | None = None
+    for R in (motion.R[0], nearest_rotation(np.vstack([nearest, np.zeros(3)]))):
+        log_s = np.log(np.sqrt(np.var(seen, axis=1).sum() / np.var((R @ shape)[:2], axis=1).sum()) / model.scale)
+        q = quaternion_from_rotation(R @ model.basis.Phi)
+        start = State(q[None], centre.T / model.radius_px, np.array([log_s]), np.zeros((1, 3, 0)))
+        found = minimise(pose_energy(model.camera), data, start, None, Solver())
+        if best is None or found.value[0] < CLEARLY_BETTER * best.value[0]:
+            best = found
+    assert best
+    return best.state
 
 
 def off_the_saddle(last: State, model: Model) -> State:

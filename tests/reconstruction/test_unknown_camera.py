@@ -16,7 +16,7 @@ from reconstruction.unknown_camera import changes, likely_camera
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
 
-FRAMES, POINTS = 30, 120
+FRAMES, POINTS = 20, 100
 
 
 def solid_seen(camera: Camera) -> np.ndarray:
@@ -46,11 +46,8 @@ def test_of_a_sheet() -> None:
 
 
 def test_what_is_not_proven_tells_no_camera(monkeypatch: pytest.MonkeyPatch) -> None:
-    W, everything = solid_seen(PERSPECTIVE), np.ones((FRAMES, POINTS), bool)
-    monkeypatch.setattr(Evidence, "proven", True)
-    assert likely_camera(W, everything).perspective
-    monkeypatch.setattr(Evidence, "proven", False)
-    assert not likely_camera(W, everything).perspective
+    monkeypatch.setattr(Evidence, "proven", False)  # the solid above, whose camera is told otherwise
+    assert not likely_camera(solid_seen(PERSPECTIVE), np.ones((FRAMES, POINTS), bool)).perspective
 
 
 @pytest.mark.parametrize("kind", ["sheet", "solid"])

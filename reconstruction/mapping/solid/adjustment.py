@@ -10,7 +10,7 @@ import numpy as np
 
 from reconstruction.arrays import Array
 from reconstruction.camera import NEAREST
-from reconstruction.mapping.solid.bundle import POSE, Bundle, Derivatives, Loss, Prior, off_plane
+from reconstruction.mapping.solid.bundle import POSE, Bundle, Derivatives, Loss, Prior, beyond_all, off_plane
 from reconstruction.mapping.solid.factors import Factors
 
 SMALLEST = 1e-2  # scale of a view over that of another: a loss that leaves the parabola may shrink one that does not fit
@@ -150,9 +150,10 @@ class System:
     @cached_property
     def points(self) -> Array:
         """(3, 3, p)."""
-        B, slope = self.derivatives.by_point, self.plane[1]
+        B, slope, outward = self.derivatives.by_point, self.plane[1], self.beyond[1]
         points = np.einsum("kdcp,kecp->dep", self.weights[:, None, None] * B, B)
-        return np.asarray(points + self.prior.depth * slope[:, None] * slope)
+        points += self.prior.depth * slope[:, None] * slope
+        return np.asarray(points + self.prior.apart * outward[:, None] * outward)
 
     @cached_property
     def right_views(self) -> Array:
@@ -168,8 +169,9 @@ class System:
     @cached_property
     def right_points(self) -> Array:
         """(3, p) minus the gradient."""
-        off, slope, _ = self.plane
-        return -np.einsum("kdcp,kcp->dp", self.derivatives.by_point, self._weighted) - self.prior.depth * off * slope
+        (off, slope, _), (beyond, outward) = self.plane, self.beyond
+        by_prior = self.prior.depth * off * slope + self.prior.apart * beyond * outward
+        return -np.einsum("kdcp,kcp->dp", self.derivatives.by_point, self._weighted) - by_prior
 
     @cached_property
     def derivatives(self) -> Derivatives:
@@ -180,6 +182,11 @@ class System:
     def plane(self) -> tuple[Array, Array, Array]:
         """What `off_plane` finds."""
         return off_plane(self.bundle.motion.shape, self.bundle.kappa)
+
+    @cached_property
+    def beyond(self) -> tuple[Array, Array]:
+        """What `beyond_all` finds."""
+        return beyond_all(self.bundle.motion.shape, self.bundle.kappa)
 
     @cached_property
     def off(self) -> Array:

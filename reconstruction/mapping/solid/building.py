@@ -118,7 +118,8 @@ class Build:
             s.append(s[parent] * self.scale[k])
             seen = s[k] * R[k] @ m.shape
             off = self.W[k] * (1 + bundle.kappa * seen[2]) - seen[:2]
-            t.append(np.median(off[:, self.h[k] > 0], axis=1))
+            shown = self.h[k] > 0
+            t.append(np.median(off[:, shown], axis=1) if shown.any() else s[k] / s[parent] * t[parent])
         return Bundle(RigidMotion(m.shape, np.array(R), np.array(s), np.array(t)), bundle.kappa)
 
     def adjusted(

@@ -22,6 +22,8 @@ POSE = 6  # θ, t, log s of a view
 HALF_WIDTH = 0.5  # relief over width that is as deep as is believed without proof
 PROOF = 0.01  # share of the residuals that twice that relief must explain
 LOOSE = 0.3  # of one observation, says that a point is no deeper
+FARTHEST = 3.0  # RMS radii from the middle; of most solids no point is farther than two
+APART = 0.1  # of its observations, says that a point is no farther, for each radius
 FOCAL_DOUBT = 0.3  # deviation of log focal length, believed as one part in FOCAL_PROOF of the observations
 FOCAL_PROOF = 0.01
 
@@ -112,26 +114,31 @@ class Loss:
 
 @dataclass(frozen=True)
 class Prior:
-    """What is believed before: a point is not far off the shape's plane, and the focal length is about as given.
+    """What is believed before: no point is far off the shape's plane, or from the rest, and the focal length is as given.
 
-    ½ depth Σ_i d_i²/(1 + κ z_i)² + ½ focal (log κ − log κ₀)², d_i the point's distance, along the first view's axis, from
-    the plane z = a x + b y + c through all, by the distance from the camera: to be nearer and smaller gains nothing.
+    ½ depth Σ_i d_i²/(1 + κ z_i)² + ½ apart Σ_i b_i² + ½ focal (log κ − log κ₀)², d_i the point's distance, along the first
+    view's axis, from the plane z = a x + b y + c through all, by the distance from the camera: to be nearer and smaller
+    gains nothing; b_i as `beyond_all` has it.
 
     Attributes:
         depth: weight of a depth; 0 for none.
+        apart: weight of being far from the rest, where what bends would rather be; 0 for none.
         focal: weight of the focal length; infinite keeps it.
         kappa: κ₀.
     """
 
     depth: float
+    apart: float
     focal: float
     kappa: float
 
     def value(self, bundle: Bundle) -> float:
         """The energy."""
         off = off_plane(bundle.motion.shape, bundle.kappa)[0]
+        beyond = beyond_all(bundle.motion.shape, bundle.kappa)[0]
         change = np.log(bundle.kappa / self.kappa) if np.isfinite(self.focal) and self.kappa > 0 else 0.0
-        return float(0.5 * self.depth * off @ off + (0.5 * self.focal * change**2 if change else 0.0))
+        value = self.depth * off @ off + self.apart * beyond @ beyond
+        return float(0.5 * value + (0.5 * self.focal * change**2 if change else 0.0))
 
 
 def off_plane(shape: Array, kappa: float) -> tuple[Array, Array, Array]:
@@ -148,6 +155,19 @@ def off_plane(shape: Array, kappa: float) -> tuple[Array, Array, Array]:
     return np.asarray(off), slope, np.asarray(-kappa * shape[2] * nearness * off)
 
 
+def beyond_all(shape: Array, kappa: float) -> tuple[Array, Array]:
+    """How much farther than `FARTHEST` points (3, p) are from the middle, (p,), and its derivatives (3, p), middle held.
+
+    Over the middle's distance from the camera: here, too, to be nearer and smaller gains nothing.
+    """
+    middle = np.median(shape, axis=1, keepdims=True)
+    nearness = 1 / (1 + kappa * middle[2])
+    away = nearness * (shape - middle)
+    radius = np.linalg.norm(away, axis=0)
+    beyond = np.maximum(radius - FARTHEST, 0.0)
+    return beyond, np.where(beyond > 0, nearness * away / np.maximum(radius, FARTHEST), 0.0)
+
+
 def prior_of(bundle: Bundle, h: Array, sigma: float, kappa: float, *, refine: bool) -> Prior:
     """Depths of half the width, the focal length as given; both as weak as so many observations of that noise."""
     shape = bundle.motion.shape
@@ -155,7 +175,7 @@ def prior_of(bundle: Bundle, h: Array, sigma: float, kappa: float, *, refine: bo
     excess = float((off_plane(shape, bundle.kappa)[0] ** 2).mean()) / deep**2
     depth = (LOOSE + PROOF * h.sum() / len(shape.T) * excess) * (sigma / deep) ** 2
     focal = FOCAL_PROOF * h.sum() * (sigma / FOCAL_DOUBT) ** 2 if refine and kappa else np.inf
-    return Prior(depth, focal, kappa)
+    return Prior(depth, APART * h.sum() / len(shape.T) * sigma**2, focal, kappa)
 
 
 @dataclass(frozen=True)

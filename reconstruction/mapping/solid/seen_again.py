@@ -34,5 +34,5 @@ def image_in(solid: Solid, W: Array, visible: Mask, camera: Camera) -> Array:
     for _ in range(ROUNDS):
         off = np.linalg.norm(bundle.image() - padded, axis=1)[counting > 0]
         loss = Loss(TAIL_SIGMAS * deviation(off, 1e-9 * float(np.abs(motion.shape).max())), redescending=False)
-        bundle, _ = adjust(padded, counting, bundle, loss, Prior(0.0, np.inf, bundle.kappa), POSES)
+        bundle, _ = adjust(padded, counting, bundle, loss, Prior(0.0, 0.0, np.inf, bundle.kappa), POSES)
     return bundle.image()[1:] + camera.center_px[:, None]

@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
 
+from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.camera import Camera
 from reconstruction.estimate import Switch
-from reconstruction.window.ambiguity import switch_between
+from reconstruction.window.ambiguity import first_pose, switch_between
 from reconstruction.window.solver import Solution
-from tests.reconstruction.world import random_state
+from tests.reconstruction.world import CAMERAS, SEEDS, model_of, random_rotation, random_state, relief, seen
 
 
 @pytest.mark.parametrize(
@@ -33,3 +36,14 @@ def test_a_better_fit_of_the_same_branch_is_no_switch() -> None:
     assert switch is not None
     assert (switch.bend, switch.share) == (pytest.approx(-1.0), pytest.approx(0.5))
     assert switch.turned_degrees < 1e-3
+
+
+@given(SEEDS, CAMERAS)
+@settings(max_examples=20, deadline=None)
+def test_a_solid_that_was_lost_may_have_turned_to_anywhere(rng: np.random.Generator, camera: Camera) -> None:
+    shape, half = relief(rng, 60), np.arange(60) < 30
+    model = model_of(shape, camera, 3)
+    motion = RigidMotion(shape, np.eye(3)[None], np.ones(1), np.zeros((1, 2)))
+    W = seen(shape[None], random_rotation(rng)[None], camera, depth=1.3)[0][0]
+    pose = first_pose(model, motion, W, half)
+    np.testing.assert_allclose(model.projection(replace(pose, Lambda=np.zeros((1, 3, 3)))), W, atol=0.1)

@@ -53,6 +53,17 @@ def build(rng: np.random.Generator, camera: Camera, visible: np.ndarray) -> tupl
 
 
 @given(SEEDS, CAMERAS)
+@settings(max_examples=3, deadline=None)
+def test_a_view_that_shows_nothing_stays_with_the_one_it_is_built_on(rng: np.random.Generator, camera: Camera) -> None:
+    visible = np.ones((VIEWS, 60), bool)
+    visible[20] = False
+    shape, views = build(rng, camera, visible)
+    bundle = views.grown(RigidMotion(shape / 100, np.eye(3)[None], np.ones(1), np.zeros((1, 2))))
+    assert np.isfinite(bundle.image()).all()
+    assert shape_error(bundle.motion.shape, shape) < 0.01
+
+
+@given(SEEDS, CAMERAS)
 @settings(max_examples=5, deadline=None)
 def test_all_views_are_factorised_either_way_round(rng: np.random.Generator, camera: Camera) -> None:
     visible = rng.random((VIEWS, 60)) > 0.1

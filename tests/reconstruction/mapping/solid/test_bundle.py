@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.mapping.solid.adjustment import Adjustment, System, adjust, energy
-from reconstruction.mapping.solid.bundle import Bundle, Derivatives, Loss, Prior, off_plane, scaled
+from reconstruction.mapping.solid.bundle import FARTHEST, Bundle, Derivatives, Loss, Prior, beyond_all, off_plane, scaled
 from tests.reconstruction.world import SEEDS, random_rotation
 
-FREE = Prior(depth=0.0, focal=1.0, kappa=0.2)
+FREE = Prior(depth=0.0, apart=0.0, focal=1.0, kappa=0.2)
 
 
 def some(rng: np.random.Generator, K: int = 3, p: int = 7, kappa: float = 0.2) -> Bundle:
@@ -36,7 +36,7 @@ def test_derivatives_agree_with_differences(rng, kappa):
 def test_right_hand_side_is_minus_the_gradient(rng, redescending, depth):
     bundle, step = some(rng, kappa=0.1), 1e-6
     W = bundle.image() + 0.3 * rng.normal(size=(3, 2, 7))
-    h, loss, prior = (rng.random((3, 7)) > 0.2).astype(float), Loss(0.5, redescending), Prior(depth, 2.0, 0.15)
+    h, loss, prior = (rng.random((3, 7)) > 0.2).astype(float), Loss(0.5, redescending), Prior(depth, 0.0, 2.0, 0.15)
     system = System(W, h, bundle, loss, prior)
     poses, points = rng.normal(size=(3, 6)), rng.normal(size=(3, 7))
     poses[0, [0, 1, 2, 5]] = 0  # the first view's turn and scale are held
@@ -81,13 +81,29 @@ def test_distance_from_the_plane_does_not_see_a_slope(rng):
 @given(SEEDS)
 @settings(deadline=None)
 def test_what_is_nearer_and_smaller_alike_looks_the_same_and_gains_nothing(rng):
-    bundle, prior = some(rng, kappa=0.1), Prior(3.0, np.inf, 0.1)
+    bundle, prior = some(rng, kappa=0.1), Prior(3.0, 2.0, np.inf, 0.1)
     axes = replace(bundle, motion=bundle.motion.in_first_frame())
+    axes.motion.shape[:2, 0] += 4 * FARTHEST
     camera = np.array([*axes.motion.t[0], 1 / axes.kappa])[:, None]  # where it is from the shape's origin
     shape = 0.3 * (axes.motion.shape + camera) - camera
     near = replace(axes, motion=replace(axes.motion, shape=shape))
     np.testing.assert_allclose(near.image()[0], axes.image()[0], atol=1e-9)
     assert prior.value(near) == pytest.approx(prior.value(axes))
+
+
+@given(SEEDS)
+@settings(deadline=None)
+def test_a_point_far_from_the_rest_is_drawn_back(rng):
+    bundle, prior, step = some(rng, p=12, kappa=0.1), Prior(0.0, 2.0, np.inf, 0.1), 1e-6
+    np.testing.assert_array_equal(beyond_all(bundle.motion.shape.clip(-1, 1), 0.1)[0], 0)
+    bundle.motion.shape[:, 0] = 4 * FARTHEST  # never in the middle
+    system = System(bundle.image(), np.ones((3, 12)), bundle, Loss(1.0, redescending=False), prior)
+    way = np.zeros((3, 12))
+    way[:, 0] = rng.normal(size=3)
+    ahead, behind = (prior.value(bundle.moved(np.zeros((3, 6)), 0.0, e * way)) for e in (step, -step))
+    slope = -(system.right_points * way).sum()
+    assert (ahead - behind) / (2 * step) == pytest.approx(slope, rel=1e-4, abs=1e-6)
+    assert system.right_points[2, 0] < 0
 
 
 @given(SEEDS, st.sampled_from([0.0, 0.1]))
