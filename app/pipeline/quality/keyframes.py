@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.pipeline.quality.finding import Grade, Verdict
-from reconstruction.basis.rest_shape import rms_radius
+from reconstruction.basis.rest_shape import RigidMotion, rms_radius
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
 from reconstruction.mapping.selection import PLAIN, Evidence
@@ -16,6 +16,7 @@ FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
 POOR_LENGTHS = 0.07  # change of them from half to half of the keyframes: sheets have up to 4.5 %, things with limbs 8 %
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
+NO_PLANE, NO_PLANE_OFF = 1.5, 0.006  # times as much as others, and share of its radius, that a plane that bends leaves over
 # What a rigid shape leaves over and neighbours share, which is no noise, over its radius and the sine of its turn: as much
 # its depth may be off, and more.
 FAIR_DEPTH = 0.0125
@@ -56,6 +57,8 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
     if toss_up(found.evidence):
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
+    if found.rest.kind == "plane":
+        yield from of_plane(found.rest.motion, found.evidence)
     if made and found.rest.kind != "plane":
         yield from of_turn(found, found.evidence)
     if found.rest.kind == "rigid":
@@ -66,11 +69,26 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
 
 def toss_up(evidence: Evidence) -> bool:
     """Whether something else may be as true. A solid or sheet that leaves as much over as a plane is as flat: none is."""
-    if evidence.kind != "flat":
-        return evidence.sureness < TOSS_UP
+    return more_than_others(evidence) > TOSS_UP if evidence.kind == "flat" else evidence.sureness < TOSS_UP
+
+
+def more_than_others(evidence: Evidence) -> float:
+    """How many times as much a plane leaves over as something else does."""
     flat, solid = evidence.flat, evidence.solid
     least_px = float(np.nanmin([solid.edges_px, evidence.sheet.edges_px]))
-    return flat.whole_px > TOSS_UP * solid.whole_px or flat.edges_px > TOSS_UP * least_px
+    return max(flat.whole_px / max(solid.whole_px, 1e-9), flat.edges_px / max(least_px, 1e-9))
+
+
+def of_plane(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
+    """What a plane says that leaves much over."""
+    if more_than_others(evidence) > NO_PLANE and evidence.flat.whole_px > NO_PLANE_OFF * radius_px(motion):
+        told = f"drawn flat, though a shape with depth leaves {more_than_others(evidence):.1f} times less over"
+        yield Verdict("poor", f"{told}: it may bend; film it turning more, from near by, or try --rest-shape sheet")
+
+
+def radius_px(motion: RigidMotion) -> float:
+    """RMS radius of a rigid shape as seen in its usual view: the shape may have any size."""
+    return float(np.median(motion.s)) * rms_radius(motion.shape)
 
 
 def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:
@@ -93,8 +111,7 @@ def hardly_more_than_a_plane(evidence: Evidence) -> bool:
 def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     """What a solid's changes, turn, depth and points say."""
     motion = found.rest.motion
-    radius_px = float(np.median(motion.s)) * rms_radius(motion.shape)  # in the images: the shape may have any size
-    whole, edges = np.array([evidence.solid.whole_px, evidence.solid.edges_px]) / radius_px
+    whole, edges = np.array([evidence.solid.whole_px, evidence.solid.edges_px]) / radius_px(motion)
     turn = evidence.turn_degrees
     if turn >= HARDLY_TURNED and hardly_more_than_a_plane(evidence):
         told = "a plane would leave hardly more over, so how deep it is is a guess"

@@ -100,6 +100,16 @@ def test_a_flat_sheet_may_as_well_be_a_solid_without_relief(
     assert "a flat sheet in many views" in said.reason or grade == "fair"
 
 
+@pytest.mark.parametrize(("left_px", "others_px", "grade"), [(2.0, 1.0, "poor"), (2.0, 1.5, "fair"), (0.3, 0.15, "fair")])
+def test_what_bends_is_drawn_flat(left_px: float, others_px: float, grade: str) -> None:
+    rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
+    others = Misfit(others_px, others_px)
+    known = replace(EVIDENCE, kind="flat", flat=Misfit(left_px, left_px), solid=others, sheet=others)
+    said = verdict(course([0.001] * 50), Map(rest, Camera(), evidence=known))
+    assert said.grade == grade
+    assert ("2.0 times less" in said.reason) == (grade == "poor")
+
+
 @pytest.mark.parametrize(
     ("whole_px", "edges_px", "turn_degrees", "grade"),
     [(1.5, 0.5, 60.0, "fair"), (1.5, 0.5, 5.0, "poor"), (0.5, 0.2, 60.0, "good"), (0.5, 0.2, 12.0, "fair"),
