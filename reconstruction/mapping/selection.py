@@ -174,12 +174,19 @@ def sheet_misfit(
 
 
 def spread_points(W: Array, visible: Mask) -> Indices:
-    """Well-spread points, each far from those before it, of points seen in most keyframes."""
+    """Well-spread points, each far from those before it, of points seen in most keyframes.
+
+    First those of the keyframe that shows most of them, then those of others, that show other sides of a solid.
+    """
     share = visible.mean(axis=0)
-    often = np.flatnonzero(share >= min(OFTEN, float(np.median(share))))
-    view = int(visible[:, often].sum(axis=1).argmax())
-    often = often[visible[view, often]]
-    return np.asarray(often[farthest_points(W[view][:, often].T, RIGID_POINTS)])
+    left = np.flatnonzero((share > 0) & (share >= min(OFTEN, float(np.median(share)))))
+    chosen: Indices = np.zeros(0, np.int64)
+    while len(left) and len(chosen) < RIGID_POINTS:
+        view = int(visible[:, left].sum(axis=1).argmax())
+        shown = left[visible[view, left]]
+        chosen = np.concatenate([chosen, shown[farthest_points(W[view][:, shown].T, RIGID_POINTS - len(chosen))]])
+        left = left[~visible[view, left]]
+    return chosen
 
 
 def spread_edges(W: Array, visible: Mask, points: Indices) -> Indices:

@@ -28,6 +28,7 @@ SHARE = 0.5  # of a point's observations that must agree with the solid
 FEWEST = 2  # of them
 ASIDE = 0.02  # weight of a point that does not move with the solid among the neighbours of one that does
 LEAST = 0.05  # of the usual distance from the neighbours' plane: no depth is surer
+CLOSEST = 0.5  # of the usual distance of neighbours: nearer ones lie behind each other, or on a side seen edge-on
 ROUNDS = 3  # of leaving out what is a spike
 LARGEST = 0.8  # times half the width, both RMS, that a vertex may be off its neighbours' plane; 12 % of the width across
 AS_OFTEN = 0.8  # as its neighbours a point is seen, or its track is doubtful
@@ -67,7 +68,8 @@ def smoothed(visible: Mask, bundle: Bundle, residual: Array) -> tuple[RigidMotio
         off = np.abs(D @ shape[2])
         tau = max(float(np.median(off[sound] if sound.any() else off)) / 0.6745, SMOOTHEST * deep)
         weight = np.where(sound, 1 / (spread + (LEAST * tau) ** 2), 1 / deep**2)
-        stiffness = D.T @ sp.diags_array((np.median(distance) / (tau * distance)) ** 2) @ D
+        usually = float(np.median(distance))
+        stiffness = D.T @ sp.diags_array((usually / (tau * distance.clip(CLOSEST * usually))) ** 2) @ D
         z = solved((sp.diags_array(weight) + stiffness).tocsc(), weight * shape[2])
         sound = sound & ~spike(D @ z, tau)
     # What smoothing left, most of it at the border: there, the plane would carry it off.

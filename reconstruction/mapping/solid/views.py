@@ -14,6 +14,7 @@ COMPARED = 120  # points: enough to tell views apart
 ROUNDS = 4  # of robust weights
 FEWEST_SHARED = 3  # points, ...
 ENOUGH_SHARED = 10  # ... and so many, or a third of what either shows: few agree by chance, those of front and back
+HIDDEN, ALL_AROUND = 0.005, 8  # share of pairs of views that share too few points; from there on so many may be first
 BESIDE = 7  # views next to the first from which a point's place in it is taken
 
 
@@ -56,11 +57,23 @@ def likeness(W: Array, visible: Mask) -> Likeness:
     return Likeness(np.where(known, a, 1.0), b, np.where(known, middle, 1e6 * (middle[known].max(initial=0.0) + 1e-300)))
 
 
-def building_order(alike: Likeness) -> tuple[Indices, Indices]:
-    """Views (K,): the one in the middle, then always the nearest to those before; and (K,) which of those that is."""
+def first_views(alike: Likeness) -> list[int]:
+    """Views to build on from: the one in the middle; where a solid hides its far side, others all around it, too.
+
+    From a view that shows one flat side, or two that look alike, the other sides may never be found.
+    """
+    apart = alike.distance + alike.distance.T
+    middle = int(np.median(apart, axis=1).argmin())
+    if np.isnan(alike.b.real).mean() < HIDDEN:
+        return [middle]
+    order, _ = building_order(alike, middle)
+    return [int(order[k]) for k in np.unique(np.linspace(0, len(order) - 1, ALL_AROUND).astype(int))]
+
+
+def building_order(alike: Likeness, first: int) -> tuple[Indices, Indices]:
+    """Views (K,): the first, then always the nearest to those before; and (K,) which of those that is."""
     K = len(alike.distance)
     apart = alike.distance + alike.distance.T
-    first = int(np.median(apart, axis=1).argmin())
     order, parent = [first], [first]
     nearest, by = apart[first].copy(), np.full(K, first)
     for _ in range(K - 1):

@@ -100,7 +100,7 @@ def test_a_flat_sheet_may_as_well_be_a_solid_without_relief(
     assert "a flat sheet in many views" in said.reason or grade == "fair"
 
 
-@pytest.mark.parametrize(("left_px", "others_px", "grade"), [(2.0, 1.0, "poor"), (2.0, 1.5, "fair"), (0.3, 0.15, "fair")])
+@pytest.mark.parametrize(("left_px", "others_px", "grade"), [(2.0, 1.0, "poor"), (2.0, 1.5, "fair"), (0.25, 0.12, "fair")])
 def test_what_bends_is_drawn_flat(left_px: float, others_px: float, grade: str) -> None:
     rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
     others = Misfit(others_px, others_px)

@@ -43,6 +43,21 @@ def test_a_thing_that_hides_its_far_side_comes_back(degrees: float, rng: np.rand
     assert shape_error(solid.shape[:, often], shape[:, often]) < 0.04
 
 
+@pytest.mark.parametrize("seed", [5, 8])
+def test_a_box_that_is_seen_all_around_has_all_its_sides(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    u, v = (55 * np.stack(np.meshgrid(*2 * [np.linspace(-1, 1, 6)]))).reshape(2, -1)
+    sides = [np.roll([u, v, np.full_like(u, away)], axis, axis=0) for axis in range(3) for away in (60.0, -60.0)]
+    shape, outward = np.concatenate(sides, axis=1), np.repeat([side.mean(axis=1) for side in sides], len(u), axis=0).T
+    angle = np.linspace(0, 2 * np.pi, 40)
+    R = rotation_from_quaternion(quaternion_exp(np.column_stack([0.6 * np.sin(1.7 * angle + seed), angle, 0.3 * angle])))
+    W, _ = seen(np.repeat(shape[None], 40, axis=0), R, PERSPECTIVE, depth=1.2)
+    visible = (R @ outward)[:, 2] < -6.0
+    solid = bundle_adjust(W + rng.normal(0, 0.2, W.shape), visible, PERSPECTIVE, refine_focal=False)
+    often = visible.sum(axis=0) >= 4
+    assert shape_error(solid.shape[:, often], shape[:, often]) < 0.02
+
+
 def build(rng: np.random.Generator, camera: Camera, visible: np.ndarray) -> tuple[np.ndarray, Build]:
     """A hilly solid and its keyframes, in units of 100 px."""
     shape = relief(rng, visible.shape[1])

@@ -1,10 +1,12 @@
 import numpy as np
 
 from reconstruction.basis.mesh import triangulate
+from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.evaluation import with_outliers
+from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.solid import bundle_adjust
-from reconstruction.mapping.solid.spikes import off_neighbours_plane, without_new_spikes, worst_spike
-from tests.reconstruction.world import PERSPECTIVE, relief, seen, shape_error, spread, turns
+from reconstruction.mapping.solid.spikes import off_neighbours_plane, smoothed, without_new_spikes, worst_spike
+from tests.reconstruction.world import PERSPECTIVE, relief, seen, shape_error, spread, turn, turns
 
 
 def test_a_plane_is_on_its_neighbours_plane():
@@ -52,6 +54,19 @@ def test_what_stands_out_of_few_points_is_no_spike():
     W = W + rng.normal(0, 1.5, W.shape)
     solid = bundle_adjust(W, rng.random((14, 36)) > 0.4, PERSPECTIVE)
     assert shape_error(solid.shape, shape) < 0.1
+
+
+def test_a_side_that_the_main_plane_shows_edge_on_has_no_spikes():
+    rng = np.random.default_rng(1)
+    front = np.concatenate([spread(rng, 64), np.full((1, 64), -40.0)])
+    y, z = np.meshgrid(np.linspace(-75, 75, 8), np.linspace(-40, 40, 8))
+    side = np.stack([np.full(64, 100.0), y.ravel(), z.ravel()]) + 0.3 * rng.normal(size=(3, 64))
+    shape = np.concatenate([front, side], axis=1)
+    R = np.stack([turn((10 * np.sin(k), 5.0 * k, 0.0)) for k in range(16)])
+    motion = RigidMotion(shape, R, np.ones(16), np.zeros((16, 2)))
+    kept, sound = smoothed(np.ones((16, 128), bool), Bundle(motion, 1 / 500), np.full((16, 128), 0.2))
+    assert sound.all()
+    np.testing.assert_allclose(kept.shape, shape, atol=0.8)
 
 
 def test_what_deforms_more_than_the_rest_is_no_spike():

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given, settings
 from scipy.spatial.transform import Rotation
 
-from reconstruction.mapping.solid.views import building_order, completed, likeness, with_unseen
+from reconstruction.mapping.solid.views import building_order, completed, first_views, likeness, with_unseen
 from tests.reconstruction.world import SEEDS, spread
 
 
@@ -26,7 +26,9 @@ def test_similarities_come_back_despite_outliers_and_missing_points(rng):
 def test_a_path_of_views_is_followed_from_its_middle():
     x = spread(np.random.default_rng(0), 50)
     W = np.stack([x * np.array([[1 - 0.1 * k], [1.0]]) for k in range(7)])
-    order, parent = building_order(likeness(W, np.ones((7, 50), bool)))
+    alike = likeness(W, np.ones((7, 50), bool))
+    (middle,) = first_views(alike)
+    order, parent = building_order(alike, middle)
     assert sorted(order) == list(range(7))
     assert order[0] in (2, 3, 4)
     assert (np.abs(order - parent)[1:] == 1).all()
@@ -40,7 +42,7 @@ def test_views_that_share_nothing_are_built_on_last() -> None:
     visible[3, :38] = False
     visible[:3, 38:] = False
     alike = likeness(W, visible)
-    order, _ = building_order(alike)
+    order, _ = building_order(alike, first_views(alike)[0])
     assert order[-1] == 3
     assert sorted(order.tolist()) == [0, 1, 2, 3]
     assert np.isfinite(alike.a).all()
