@@ -131,7 +131,7 @@ def bundle_adjust(
     given, visible = visible, without_outliers(W, visible)
     W = np.where(given[:, None], W, 0.0) - camera.center_px[:, None]
     alike = likeness(W, visible)
-    first, *others = (begun(W, visible, camera, alike, view, flat=flat) for view in first_views(alike))
+    first, *others = (begun(W, visible, camera, alike, view, flat=flat) for view in first_views(alike, visible))
     likely = [] if flat else sorted(others, key=lambda one: one.grown_energy)[:SETTLED]
     found = [first.best(known, whole=not flat, refine=refine_focal), *(one.best(refine=refine_focal) for one in likely)]
     begin, best, energy = min(found, key=lambda one: one[2])

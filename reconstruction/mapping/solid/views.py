@@ -57,17 +57,22 @@ def likeness(W: Array, visible: Mask) -> Likeness:
     return Likeness(np.where(known, a, 1.0), b, np.where(known, middle, 1e6 * (middle[known].max(initial=0.0) + 1e-300)))
 
 
-def first_views(alike: Likeness) -> list[int]:
+def first_views(alike: Likeness, visible: Mask) -> list[int]:
     """Views to build on from: the one in the middle; where a solid hides its far side, others all around it, too.
 
     From a view that shows one flat side, or two that look alike, the other sides may never be found.
+
+    Args:
+        alike: how alike the views are.
+        visible: (K, p).
     """
     apart = alike.distance + alike.distance.T
     middle = int(np.median(apart, axis=1).argmin())
     if np.isnan(alike.b.real).mean() < HIDDEN:
         return [middle]
-    order, _ = building_order(alike, middle)
-    return [int(order[k]) for k in np.unique(np.linspace(0, len(order) - 1, ALL_AROUND).astype(int))]
+    order, count = building_order(alike, middle)[0][1:], visible.sum(axis=1)
+    order = order[count[order] >= np.median(count)]
+    return [middle, *(int(order[k]) for k in np.unique(np.linspace(0, len(order) - 1, ALL_AROUND - 1).astype(int)))]
 
 
 def building_order(alike: Likeness, first: int) -> tuple[Indices, Indices]:

@@ -27,7 +27,7 @@ def test_a_path_of_views_is_followed_from_its_middle():
     x = spread(np.random.default_rng(0), 50)
     W = np.stack([x * np.array([[1 - 0.1 * k], [1.0]]) for k in range(7)])
     alike = likeness(W, np.ones((7, 50), bool))
-    (middle,) = first_views(alike)
+    (middle,) = first_views(alike, np.ones((7, 50), bool))
     order, parent = building_order(alike, middle)
     assert sorted(order) == list(range(7))
     assert order[0] in (2, 3, 4)
@@ -42,7 +42,7 @@ def test_views_that_share_nothing_are_built_on_last() -> None:
     visible[3, :38] = False
     visible[:3, 38:] = False
     alike = likeness(W, visible)
-    order, _ = building_order(alike, first_views(alike)[0])
+    order, _ = building_order(alike, first_views(alike, visible)[0])
     assert order[-1] == 3
     assert sorted(order.tolist()) == [0, 1, 2, 3]
     assert np.isfinite(alike.a).all()
@@ -72,3 +72,14 @@ def test_front_and_back_are_not_alike_for_few_points_they_share() -> None:
     apart = likeness(W, visible).distance
     assert apart[0, 2] > 1e3 * apart[0, 1]
     assert likeness(W[:, :, 36:], visible[:, 36:]).distance[0, 2] < 1e-6  # all that either shows
+
+
+def test_what_hides_its_far_side_is_begun_on_all_sides_but_not_where_little_shows() -> None:
+    rng = np.random.default_rng(5)
+    W, around = rng.normal(0, 50, (12, 2, 60)), np.arange(60) // 5
+    visible = (around - np.arange(12)[:, None]) % 12 < 6  # half of the points, of other sides in each
+    visible[3] &= around == 3
+    views = first_views(likeness(W, visible), visible)
+    assert len(views) == len(set(views)) > 4
+    assert 3 not in views
+    assert {view // 4 for view in views} == {0, 1, 2}
