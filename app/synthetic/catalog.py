@@ -198,5 +198,6 @@ KINDS = {
     "opening-box": Kind("solid", opening, SOLID_TURN),
     "heart": Kind("solid", living(heart, 0.1), SHEET_TURN),
     "can": Kind("solid", still(solid.can), SOLID_TURN, held_back=True),
+    "drum": Kind("solid", still(solid.drum), (120.0, 180.0)),
     "balloon": Kind("", swelling, SOLID_TURN),
 }

@@ -1,4 +1,4 @@
-"""Solids seen from their front: box, can, head; a balloon that swells; and what makes them live or chew.
+"""Solids from their front: box, can, head; all around: a drum; a balloon that swells; and what makes them live or chew.
 
 A place is (x, y) on a rectangle of width 1; its shape is a point (x, y, z) with z to the back.
 """
@@ -21,6 +21,11 @@ def box(places: Array) -> Array:
 def can(places: Array) -> Array:
     """The front of a round can."""
     return bent(places, ACROSS, lambda arc: 2.4 * arc)
+
+
+def drum(places: Array) -> Array:
+    """A round can, all around it."""
+    return bent(places, ACROSS, lambda arc: 6.2 * arc)
 
 
 def head(places: Array) -> Array:

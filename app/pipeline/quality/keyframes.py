@@ -21,6 +21,7 @@ NO_PLANE, NO_PLANE_OFF = 1.5, 0.006  # times as much as others, and share of its
 # its depth may be off, and more.
 FAIR_DEPTH = 0.0125
 FAIR_CHANGE, POOR_CHANGE = 0.028, 0.04  # the same with noise, over the radius alone: what changes is no longer small
+FAR_TURNED = 90.0  # degrees: views of a solid that turns farther share few points
 WITH_TURN = 0.7  # share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
@@ -126,7 +127,8 @@ def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
         yield Verdict("fair", f"{told}; film it turning more")
     if found.deformations is not None and found.deformations.turning > WITH_TURN:
         told = f"{found.deformations.turning:.0%} of its changes go with its turn: which is which is a guess"
-        yield Verdict("fair", f"{told}; film it turning while it keeps its shape")
+        grade: Grade = "poor" if turn > FAR_TURNED else "fair"  # its sides may be put together wrongly
+        yield Verdict(grade, f"{told}; film it turning while it keeps its shape")
     rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
     if rare > MOST_RARE:
         yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")

@@ -169,11 +169,16 @@ def test_a_solid_that_explains_hardly_more_than_a_plane(flat_px: float, grade: s
     assert ("a plane would leave hardly more" in said.reason) == (grade == "fair")
 
 
-@pytest.mark.parametrize(("turning", "grade"), [(0.6, "good"), (0.85, "fair")])
-def test_changes_that_go_with_the_turn(turning: float, grade: str) -> None:
-    said = verdict(course([0.001] * 50), replace(SOLID, deformations=Deformations(np.eye(3), 0.01, turning)))
+@pytest.mark.parametrize(
+    ("turning", "turn_degrees", "grade"), [(0.6, 30.0, "good"), (0.85, 30.0, "fair"), (0.85, 150.0, "poor")]
+)
+def test_changes_that_go_with_the_turn(turning: float, turn_degrees: float, grade: str) -> None:
+    evidence = replace(EVIDENCE, turn_degrees=turn_degrees)
+    said = verdict(
+        course([0.001] * 50), replace(SOLID, evidence=evidence, deformations=Deformations(np.eye(3), 0.01, turning))
+    )
     assert said.grade == grade
-    assert ("85% of its changes go with its turn" in said.reason) == (grade == "fair")
+    assert ("85% of its changes go with its turn" in said.reason) == (grade != "good")
 
 
 def test_a_sheet_that_stretches_while_nothing_turns_may_be_anything() -> None:
