@@ -121,14 +121,14 @@ def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     if depth > FAIR_DEPTH or whole > FAIR_CHANGE:
         told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
         yield Verdict("poor" if whole > POOR_CHANGE else "fair", f"{told}; film it turning more")
+    at_worst: Grade = "poor" if turn > FAR_TURNED else "fair"  # its sides may be put together wrongly
     deep, half = relief(motion.shape), evidence.relief
     if max(deep, half) > OTHERWISE_DEEP * min(deep, half):
         told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"
-        yield Verdict("fair", f"{told}; film it turning more")
+        yield Verdict(at_worst, f"{told}; film it turning more")
     if found.deformations is not None and found.deformations.turning > WITH_TURN:
         told = f"{found.deformations.turning:.0%} of its changes go with its turn: which is which is a guess"
-        grade: Grade = "poor" if turn > FAR_TURNED else "fair"  # its sides may be put together wrongly
-        yield Verdict(grade, f"{told}; film it turning while it keeps its shape")
+        yield Verdict(at_worst, f"{told}; film it turning while it keeps its shape")
     rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
     if rare > MOST_RARE:
         yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")

@@ -12,7 +12,7 @@ from reconstruction.mapping.factorization import factorize
 from reconstruction.mapping.outliers import medians
 from reconstruction.mapping.solid.adjustment import Adjustment, adjust
 from reconstruction.mapping.solid.bundle import Bundle, Loss, prior_of
-from reconstruction.mapping.solid.placing import FEWEST_POINTS, FEWEST_VIEWS, located, placed_by
+from reconstruction.mapping.solid.placing import FEWEST_POINTS, FEWEST_VIEWS, located, placed_by, resection
 from reconstruction.window.robust import RAYLEIGH_MEDIAN, deviation
 
 FIRST_VIEWS = 4  # adjusted together first; then twice as many, and so on
@@ -24,6 +24,9 @@ PLACING = Adjustment(steps=5, tolerance=1e-2, points=False)
 GROWING = Adjustment(steps=6, tolerance=1e-2)
 SETTLING = Adjustment(steps=15, tolerance=1e-3)
 PLACING_POINTS = Adjustment(steps=15, tolerance=1e-3, poses=False)
+REPOSING = Adjustment(steps=15, tolerance=1e-3, points=False)
+REPOSED_SIGMAS, RESECTIONS = 4.0, 5  # of the residuals, beyond which a point is far off; rounds of robust weights
+HARDLY, MOSTLY = 0.6, 0.8  # of its views a point must fit, and of its points a view; and times the residual, a better pose
 FLAT = 1e5  # weight of a depth off a plane
 ROUNDS = 3  # of the noise at the end
 
@@ -90,6 +93,32 @@ class Build:
         for _ in range(ROUNDS):
             bundle, value = self.adjusted(bundle, SETTLING, refine=refine, redescending=True)
         return bundle, value
+
+    def reposed(self, bundle: Bundle) -> Bundle:
+        """Views in which many points are far off posed anew, by those that are not elsewhere, where that fits better.
+
+        A view that was placed by few points may be stuck, and no step of all of them mends it.
+        """
+        m, seen = bundle.motion, self.h > 0
+        residual = np.where(seen, np.linalg.norm(bundle.image() - self.W, axis=1), np.nan)
+        near = residual < REPOSED_SIGMAS * deviation(residual[seen], LEAST_TAIL / TAIL_SIGMAS)
+        sound = near.sum(axis=0) > HARDLY * seen.sum(axis=0)
+        R, s, t = m.R.copy(), m.s.copy(), m.t.copy()
+        for k in np.flatnonzero(near.sum(axis=1) < MOSTLY * seen.sum(axis=1)):
+            use = seen[k] & sound
+            if use.sum() >= FEWEST_POINTS:
+                X, u = m.shape[:, use], self.W[k][:, use]
+                R[k], s[k] = resection(X, u, RESECTIONS)
+                Y = s[k] * R[k] @ X
+                t[k] = np.median(u * (1 + bundle.kappa * Y[2]) - Y[:2], axis=1)
+        other, _ = self.adjusted(Bundle(RigidMotion(m.shape, R, s, t), bundle.kappa), REPOSING)
+        there = np.where(seen, np.linalg.norm(other.image() - self.W, axis=1), np.nan)
+        better = medians(there, axis=1) < MOSTLY * medians(residual, axis=1)
+        R, s, t = (
+            np.where(better.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+            for new, old in ((other.motion.R, m.R), (other.motion.s, m.s), (other.motion.t, m.t))
+        )
+        return Bundle(RigidMotion(m.shape, R, s, t), bundle.kappa)
 
     def completed(self, bundle: Bundle, points: Indices) -> Bundle:
         """A bundle of some points with all of them where its poses place them, each as well as it moves with the others.

@@ -40,13 +40,26 @@ def dome(first: Array, kappa: float, *, flat: bool) -> RigidMotion:
 
 def placed_like(first: Array, shape: Array) -> RigidMotion:
     """A shape (3, p) as large and turned as it looks most like the image (2, p)."""
-    t = first.mean(axis=1)
+    R, s = resection(shape, first)
     shape = shape - shape.mean(axis=1, keepdims=True)
-    affine = (first - t[:, None]) @ np.linalg.pinv(shape)
+    return RigidMotion(s * R @ shape, np.eye(3)[None], np.ones(1), first.mean(axis=1)[None])
+
+
+def resection(shape: Array, image: Array, rounds: int = 1) -> tuple[Array, float]:
+    """Rotation (3, 3) and scale with which a shape (3, n) looks most like an image (2, n), as if there were no perspective.
+
+    With more rounds, points that are far off count for little.
+    """
+    h = np.ones(shape.shape[1])
+    for _ in range(rounds):
+        w = h / h.sum()
+        X, u = shape - (shape @ w)[:, None], image - (image @ w)[:, None]
+        affine = (u * w) @ X.T @ np.linalg.pinv((X * w) @ X.T, rcond=1e-9, hermitian=True)
+        off = np.linalg.norm(u - affine @ X, axis=0)
+        h = 1 / (1 + (off / (2 * np.median(off) + 1e-12)) ** 2) ** 2
     U, size, Vt = np.linalg.svd(affine, full_matrices=False)
     rows = U @ Vt
-    turned = np.concatenate([rows, np.cross(rows[0], rows[1])[None]]) @ shape
-    return RigidMotion(float(size.mean()) * turned, np.eye(3)[None], np.ones(1), t[None])
+    return np.concatenate([rows, np.cross(rows[0], rows[1])[None]]), float(size.mean())
 
 
 def placed_by(W: Array, h: Array, bundle: Bundle, *, flat: bool) -> Array:

@@ -19,6 +19,7 @@ from reconstruction.mapping.solid.placing import FEWEST_POINTS, FEWEST_VIEWS, do
 from reconstruction.mapping.solid.spikes import smoothed
 from reconstruction.mapping.solid.views import Likeness, building_order, completed, first_views, likeness, with_unseen
 
+REPOSINGS, ENOUGH = 5, 0.999  # rounds of posing views anew, while they lower the energy to less than so much of it
 SETTLED = 4  # of those that begin elsewhere, the likeliest as grown, are adjusted until nothing changes
 
 
@@ -89,8 +90,13 @@ class Begun:
         """Of that, an observation, px²."""
         return self.chosen.adjusted(self.grown, Adjustment(steps=0))[1] * self.unit**2
 
-    def best(self, known: Array | None = None, *, whole: bool = False, refine: bool) -> tuple["Begun", Bundle, float]:
-        """Itself, the likeliest bundle and its energy, px²: grown on a dome or a known shape, or the whole at once."""
+    def best(
+        self, known: Array | None = None, *, whole: bool = False, hidden: bool = True, refine: bool
+    ) -> tuple["Begun", Bundle, float]:
+        """Itself, the likeliest bundle and its energy, px²: grown on a dome or a known shape, or the whole at once.
+
+        Where a solid hides its far side, views that do not fit are posed anew.
+        """
         build = self.chosen
         both_ways = build.factorized() if whole else []
         starts = [*both_ways, self.grown]
@@ -101,6 +107,11 @@ class Begun:
         if build.kappa and k >= len(both_ways):
             other, its_energy = build.settled(best.reversed(), refine=refine)
             best, energy = (other, its_energy) if its_energy < energy else (best, energy)
+        for _ in range(REPOSINGS if hidden else 0):
+            other, its_energy = build.settled(build.reposed(best), refine=refine)
+            if not its_energy < ENOUGH * energy:
+                break
+            best, energy = other, its_energy
         return self, best, energy * self.unit**2
 
 
@@ -133,7 +144,8 @@ def bundle_adjust(
     alike = likeness(W, visible)
     first, *others = (begun(W, visible, camera, alike, view, flat=flat) for view in first_views(alike, visible))
     likely = [] if flat else sorted(others, key=lambda one: one.grown_energy)[:SETTLED]
-    found = [first.best(known, whole=not flat, refine=refine_focal), *(one.best(refine=refine_focal) for one in likely)]
+    found = [first.best(known, whole=not flat, hidden=bool(likely), refine=refine_focal)]
+    found += [one.best(refine=refine_focal) for one in likely]
     begin, best, energy = min(found, key=lambda one: one[2])
     bundle, order = scaled(begin.build.completed(best, begin.some), begin.unit), begin.order
     back = np.argsort(order)
