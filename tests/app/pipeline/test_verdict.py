@@ -127,11 +127,12 @@ def test_the_depth_of_a_solid_that_changes(whole_px: float, edges_px: float, tur
         assert ("how deep it is is a guess" in said.reason) == (grade != "good")
 
 
+@pytest.mark.parametrize(("turn_degrees", "grade"), [(30.0, "fair"), (150.0, "poor")])
 @pytest.mark.parametrize("factor", [0.5, 2.0])
-def test_a_solid_that_half_of_the_keyframes_find_otherwise_deep(factor: float) -> None:
-    half = replace(EVIDENCE, relief=factor * EVIDENCE.relief)
+def test_a_solid_that_half_of_the_keyframes_find_otherwise_deep(factor: float, turn_degrees: float, grade: str) -> None:
+    half = replace(EVIDENCE, relief=factor * EVIDENCE.relief, turn_degrees=turn_degrees)
     said = verdict(course([0.001] * 50), replace(SOLID, evidence=half))
-    assert said.grade == "fair"
+    assert said.grade == grade
     assert "depth is a guess" in said.reason
 
 

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
+from reconstruction.mapping.solid.adjustment import Adjustment
 from reconstruction.mapping.solid.building import Build
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.placing import located
@@ -137,3 +138,16 @@ def test_points_of_a_plane_are_located_on_it_by_one_view(rng: np.random.Generato
     W = W - camera.center_px[:, None]
     found = located(W, visible.astype(float), Bundle(lost, 1 / camera.focal_px), new, flat=True)
     np.testing.assert_allclose(found.motion.shape, whole.shape, atol=0.05)
+
+
+@given(SEEDS, CAMERAS)
+@settings(max_examples=5, deadline=None)
+def test_a_view_that_is_stuck_is_posed_anew(rng: np.random.Generator, camera: Camera) -> None:
+    shape, views = build(rng, camera, np.ones((VIEWS, 60), bool))
+    known = RigidMotion(shape / 100, turns(VIEWS), np.ones(VIEWS), np.zeros((VIEWS, 2)))
+    right, _ = views.adjusted(Bundle(known, views.kappa), Adjustment())
+    m = right.motion
+    R = m.R.copy()
+    R[7] = R[7] @ np.diag([-1.0, 1.0, -1.0])
+    stuck = Bundle(RigidMotion(m.shape, R, m.s, m.t), right.kappa)
+    np.testing.assert_allclose(views.reposed(stuck).image(), views.W, atol=0.02)
