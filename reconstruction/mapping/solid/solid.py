@@ -87,8 +87,11 @@ class Begun:
 
     @property
     def grown_energy(self) -> float:
-        """Of that, an observation, px²."""
-        return self.chosen.adjusted(self.grown, Adjustment(steps=0))[1] * self.unit**2
+        """Of that, an observation, px²; infinite where nothing can be built on its first view."""
+        try:
+            return self.chosen.adjusted(self.grown, Adjustment(steps=0))[1] * self.unit**2
+        except np.linalg.LinAlgError:
+            return float("inf")
 
     def best(
         self, known: Array | None = None, *, whole: bool = False, hidden: bool = True, refine: bool
@@ -143,7 +146,8 @@ def bundle_adjust(
     W = np.where(given[:, None], W, 0.0) - camera.center_px[:, None]
     alike = likeness(W, visible)
     first, *others = (begun(W, visible, camera, alike, view, flat=flat) for view in first_views(alike, visible))
-    likely = [] if flat else sorted(others, key=lambda one: one.grown_energy)[:SETTLED]
+    ranked = [] if flat else sorted((one.grown_energy, k) for k, one in enumerate(others))
+    likely = [others[k] for value, k in ranked[:SETTLED] if np.isfinite(value)]
     found = [first.best(known, whole=not flat, hidden=bool(likely), refine=refine_focal)]
     found += [one.best(refine=refine_focal) for one in likely]
     begin, best, energy = min(found, key=lambda one: one[2])
