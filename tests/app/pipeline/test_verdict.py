@@ -1,8 +1,6 @@
 """The verdict on a run, by what its frames and keyframes tell."""
 
-from dataclasses import dataclass, replace
-from types import SimpleNamespace
-from typing import cast
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +10,6 @@ from app.pipeline.quality.frames import longest
 from app.pipeline.quality.verdict import verdict
 from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera
-from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.selection import Evidence
 from reconstruction.mapping.solid.deforming.deformations import Deformations
@@ -136,20 +133,6 @@ def test_a_solid_that_half_of_the_keyframes_find_otherwise_deep(factor: float, t
     assert "depth is a guess" in said.reason
 
 
-@dataclass
-class Sheet:
-    """What a verdict asks of one."""
-
-    stretch: float = 0.003
-    strain_rms: float = 0.004
-    points: int = 100
-    by_focal: float = 0.0
-
-    @property
-    def warps(self) -> SimpleNamespace:
-        return SimpleNamespace(weights=np.ones((30, self.points)))
-
-
 def test_what_deforms_may_seem_to_turn() -> None:
     deforms = replace(SOLID, deformations=Deformations(np.eye(3), 0.01))
     noisy = replace(EVIDENCE, turn_degrees=14.0, solid=Misfit(1.0, 1.0))
@@ -180,45 +163,6 @@ def test_changes_that_go_with_the_turn(turning: float, turn_degrees: float, grad
     )
     assert said.grade == grade
     assert ("85% of its changes go with its turn" in said.reason) == (grade != "good")
-
-
-def test_a_sheet_that_stretches_while_nothing_turns_may_be_anything() -> None:
-    left = {"flat": Misfit(0.5, 0.5), "solid": Misfit(0.3, 0.45)}
-    still = replace(EVIDENCE, kind="sheet", turn_degrees=10.0, **left)
-    for stretch, sureness, grade in ((0.008, 1.5, "poor"), (0.003, 2.3, "fair"), (0.003, 2.5, "good")):
-        sheet, told = cast(IsometricSheet, Sheet(stretch=stretch)), replace(still, sureness=sureness)
-        found = Map(replace(REST, kind="isometric"), Camera(500.0), sheet, evidence=told)
-        said = verdict(course([0.003] * 50), found)
-        assert said.grade == grade
-        assert ("turned by 10° alone" in said.reason) == (grade != "good")
-
-
-@pytest.mark.parametrize(
-    ("sheet", "focal_px", "grade", "says"),
-    [
-        (Sheet(), 500.0, "good", "many views"),
-        (Sheet(), np.inf, "fair", "without perspective"),
-        (Sheet(stretch=0.008), 500.0, "fair", "change by 0.8%"),
-        (Sheet(stretch=0.008, strain_rms=0.02), 500.0, "poor", "change by 2.0%"),
-        (Sheet(points=25), 500.0, "fair", "25 points"),
-        (Sheet(by_focal=0.032), 500.0, "fair", "off by 3.2%"),
-    ],
-)
-def test_a_sheet_by_its_lengths_points_and_camera(sheet: Sheet, focal_px: float, grade: str, says: str) -> None:
-    evidence = replace(EVIDENCE, kind="sheet")
-    found = Map(replace(REST, kind="isometric"), Camera(focal_px), cast(IsometricSheet, sheet), evidence=evidence)
-    said = verdict(course([0.003] * 50), found)
-    assert said.grade == grade
-    assert says in said.reason
-
-
-@pytest.mark.parametrize(("change", "grade"), [(0.045, "good"), (0.08, "poor")])
-def test_a_sheet_has_the_same_lengths_by_either_half_of_the_keyframes(change: float, grade: str) -> None:
-    evidence = replace(EVIDENCE, kind="sheet", length_change=change)
-    found = Map(replace(REST, kind="isometric"), Camera(500.0), cast(IsometricSheet, Sheet()), evidence=evidence)
-    said = verdict(course([0.003] * 50), found)
-    assert said.grade == grade
-    assert ("half to half" in said.reason) == (grade == "poor")
 
 
 @pytest.mark.parametrize(("keyframes", "grade"), [(30, "good"), (60, "fair")])

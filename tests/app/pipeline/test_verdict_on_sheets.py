@@ -1,0 +1,68 @@
+"""The verdict on sheets, by their lengths, points, turn and camera."""
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from app.pipeline.quality.verdict import verdict
+from reconstruction.camera import Camera
+from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.map import Map
+from reconstruction.mapping.solid.rivals import Misfit
+from tests.app.pipeline.test_verdict import EVIDENCE, REST, course
+
+
+@dataclass
+class Sheet:
+    """What a verdict asks of one."""
+
+    stretch: float = 0.003
+    strain_rms: float = 0.004
+    points: int = 100
+    by_focal: float = 0.0
+
+    @property
+    def warps(self) -> SimpleNamespace:
+        return SimpleNamespace(weights=np.ones((30, self.points)))
+
+
+def test_a_sheet_that_stretches_while_nothing_turns_may_be_anything() -> None:
+    left = {"flat": Misfit(0.5, 0.5), "solid": Misfit(0.3, 0.45)}
+    still = replace(EVIDENCE, kind="sheet", turn_degrees=10.0, **left)
+    for stretch, sureness, grade in ((0.008, 1.5, "poor"), (0.003, 2.3, "fair"), (0.003, 2.5, "good")):
+        sheet, told = cast(IsometricSheet, Sheet(stretch=stretch)), replace(still, sureness=sureness)
+        found = Map(replace(REST, kind="isometric"), Camera(500.0), sheet, evidence=told)
+        said = verdict(course([0.003] * 50), found)
+        assert said.grade == grade
+        assert ("turned by 10° alone" in said.reason) == (grade != "good")
+
+
+@pytest.mark.parametrize(
+    ("sheet", "focal_px", "grade", "says"),
+    [
+        (Sheet(), 500.0, "good", "many views"),
+        (Sheet(), np.inf, "fair", "without perspective"),
+        (Sheet(stretch=0.008), 500.0, "fair", "change by 0.8%"),
+        (Sheet(stretch=0.008, strain_rms=0.02), 500.0, "poor", "change by 2.0%"),
+        (Sheet(points=25), 500.0, "fair", "25 points"),
+        (Sheet(by_focal=0.032), 500.0, "fair", "off by 3.2%"),
+    ],
+)
+def test_a_sheet_by_its_lengths_points_and_camera(sheet: Sheet, focal_px: float, grade: str, says: str) -> None:
+    evidence = replace(EVIDENCE, kind="sheet")
+    found = Map(replace(REST, kind="isometric"), Camera(focal_px), cast(IsometricSheet, sheet), evidence=evidence)
+    said = verdict(course([0.003] * 50), found)
+    assert said.grade == grade
+    assert says in said.reason
+
+
+@pytest.mark.parametrize(("change", "grade"), [(0.045, "good"), (0.08, "poor")])
+def test_a_sheet_has_the_same_lengths_by_either_half_of_the_keyframes(change: float, grade: str) -> None:
+    evidence = replace(EVIDENCE, kind="sheet", length_change=change)
+    found = Map(replace(REST, kind="isometric"), Camera(500.0), cast(IsometricSheet, Sheet()), evidence=evidence)
+    said = verdict(course([0.003] * 50), found)
+    assert said.grade == grade
+    assert ("half to half" in said.reason) == (grade == "poor")
