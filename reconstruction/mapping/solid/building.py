@@ -58,6 +58,10 @@ class Build:
         """The same of some points."""
         return replace(self, W=self.W[:, :, points], h=self.h[:, points], first=self.first[:, points])
 
+    def residual(self, bundle: Bundle) -> Array:
+        """Lengths (K, p), NaN where nothing is seen."""
+        return np.where(self.h > 0, np.linalg.norm(bundle.image() - self.W, axis=1), np.nan)
+
     def factorized(self) -> list[Bundle]:
         """From all views at once, as if there were no perspective (Tomasi and Kanade); where there is, either way round.
 
@@ -100,7 +104,7 @@ class Build:
         A view that was placed by few points may be stuck, and no step of all of them mends it.
         """
         m, seen = bundle.motion, self.h > 0
-        residual = np.where(seen, np.linalg.norm(bundle.image() - self.W, axis=1), np.nan)
+        residual = self.residual(bundle)
         near = residual < REPOSED_SIGMAS * deviation(residual[seen], LEAST_TAIL / TAIL_SIGMAS)
         sound = near.sum(axis=0) > HARDLY * seen.sum(axis=0)
         R, s, t = m.R.copy(), m.s.copy(), m.t.copy()
@@ -112,8 +116,7 @@ class Build:
                 Y = s[k] * R[k] @ X
                 t[k] = np.median(u * (1 + bundle.kappa * Y[2]) - Y[:2], axis=1)
         other, _ = self.adjusted(Bundle(RigidMotion(m.shape, R, s, t), bundle.kappa), REPOSING)
-        there = np.where(seen, np.linalg.norm(other.image() - self.W, axis=1), np.nan)
-        better = medians(there, axis=1) < MOSTLY * medians(residual, axis=1)
+        better = medians(self.residual(other), axis=1) < MOSTLY * medians(residual, axis=1)
         R, s, t = (
             np.where(better.reshape(-1, *[1] * (new.ndim - 1)), new, old)
             for new, old in ((other.motion.R, m.R), (other.motion.s, m.s), (other.motion.t, m.t))
@@ -129,7 +132,7 @@ class Build:
         shape[:, points] = bundle.motion.shape
         bundle = Bundle(replace(bundle.motion, shape=shape), bundle.kappa)
         for _ in range(ROUNDS):
-            residual = np.where(self.h > 0, np.linalg.norm(bundle.image() - self.W, axis=1), np.nan)
+            residual = self.residual(bundle)
             sigma = deviation(residual[self.h > 0], LEAST_TAIL / TAIL_SIGMAS)
             own = np.nan_to_num(medians(residual, axis=0)) / RAYLEIGH_MEDIAN
             scale = TAIL_SIGMAS * sigma if self.flat else OWN_SIGMAS * own.clip(sigma)  # nothing of a plane is livelier

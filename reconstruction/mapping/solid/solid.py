@@ -74,7 +74,7 @@ class Begun:
     some: Indices
     unit: float
 
-    @property
+    @cached_property
     def chosen(self) -> Build:
         """What is adjusted together."""
         return self.build.of(self.some)
@@ -145,8 +145,9 @@ def bundle_adjust(
     given, visible = visible, without_outliers(W, visible)
     W = np.where(given[:, None], W, 0.0) - camera.center_px[:, None]
     alike = likeness(W, visible)
-    first, *others = (begun(W, visible, camera, alike, view, flat=flat) for view in first_views(alike, visible))
-    ranked = [] if flat else sorted((one.grown_energy, k) for k, one in enumerate(others))
+    views = first_views(alike, visible)[: 1 if flat else None]
+    first, *others = (begun(W, visible, camera, alike, view, flat=flat) for view in views)
+    ranked = sorted((one.grown_energy, k) for k, one in enumerate(others))
     likely = [others[k] for value, k in ranked[:SETTLED] if np.isfinite(value)]
     found = [first.best(known, whole=not flat, hidden=bool(likely), refine=refine_focal)]
     found += [one.best(refine=refine_focal) for one in likely]
