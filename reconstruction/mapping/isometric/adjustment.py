@@ -14,7 +14,7 @@ from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS as FINE_SHAPES
 from reconstruction.mapping.isometric.bundle import places_moved
-from reconstruction.mapping.isometric.convex import convex_finish, convex_start
+from reconstruction.mapping.isometric.convex import convex_finish, convex_start, parts_of
 from reconstruction.mapping.isometric.lengths import (
     Edges,
     Solver,
@@ -49,7 +49,6 @@ LITTLE_GAIN = 0.1  # of the change: a round that brought less is the last
 MOST_CHANGE = 0.06  # of lengths, rms, noise apart: no cloth seems to, with folds cut off; less is weighed against a solid
 MOST_AT_ALL = 0.08  # with noise: what is that far off smooth images is not noise
 MOST_PARALLAX = 0.01  # over the image's RMS radius: true sheets up to 0.5 %, by noise; what is seen through 1.5 % and more
-PART_LEFT_OUT = 0.4  # of the points
 SOLVER = Solver()
 
 
@@ -145,22 +144,25 @@ def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:
     return by_part(replace(found, camera=replace(found.camera, focal_px=focal_px)), np.arange(len(found.coefficients)))
 
 
-def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> IsometricSheet:
+def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS, *, weighed: bool = True) -> IsometricSheet:
     """The sheet with shapes, lengths and the places of its points on the reference image adjusted together.
 
     Args:
         found: what its keyframes say, image by image.
         W: (F, 2, p) px, its keyframes; anything where not visible.
         rounds: of shapes, then places and lengths.
+        weighed: points are weighed by how far the shapes are off them; else for good by how far they are off smooth images.
 
     Raises:
         ReconstructionError: a part of it comes out behind the camera.
     """
-    weights = found.warps.weights * found.warps.inlier / found.warps.noise_px[:, None] ** 2
-    W, shapes, placed = np.where(weights[:, None] > 0, W, 0.0), found.shapes(), found.warps.placed
+    seen, shapes, placed = found.warps.weights > 0, found.shapes(), found.warps.placed
+    W = np.where(seen[:, None], W, 0.0)
     rays, way = rays_of(W, found.camera)[:, :2, placed], np.zeros(len(found.log_lengths))
     for k in range(rounds):
         prior = found.prior_of(shapes, FIRM if k >= ROUGH_ROUNDS else ROUGH, of_others=True)
+        if weighed or k == 0:
+            weights = found.weighed(shapes, W, seen)
         C = found.bundled(shapes, W, weights, prior)
         places = found.warps.reference.copy()
         slopes = found.warps.field.slopes_at(places[:, placed])[:, : C.shape[2]]
@@ -205,12 +207,6 @@ def first_depths(nodes: Nodes, seen: Edges, B: Array, stiffness: Array, camera: 
     alike = nearest(nodes.images[rest], nodes.images[few])
     starts = [c[alike[:, k]] for k in range(min(OTHER_STARTS, len(c)))]
     return np.concatenate([c, best_start(seen.frames(rest), logs, starts, stiffness, SOLVER.bend)])
-
-
-def parts_of(reference: Array) -> list[Mask]:
-    """The points (2, m) of an image: all, and what is left without one side of it."""
-    sides = [sign * axis for axis in reference for sign in (1, -1)]
-    return [np.ones(reference.shape[1], bool), *(np.asarray(side >= np.quantile(side, PART_LEFT_OUT)) for side in sides)]
 
 
 def again(

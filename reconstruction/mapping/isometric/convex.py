@@ -14,6 +14,7 @@ from reconstruction.mapping.isometric.nodes import NEIGHBOURS, Nodes, neighbours
 from reconstruction.mapping.outliers import medians
 
 CONVEX_NODES = 40
+PART_LEFT_OUT = 0.4  # of the points
 STIFFNESS = 1e-3
 SEEN = 0.3  # weight of an edge that can be relied on
 
@@ -26,6 +27,12 @@ def convex_start(nodes: Nodes, part: Mask, edges: Edges, B: Array, stiffness: Ar
     c = coefficients_of(np.log(depth), B[few], stiffness)
     c[:, 0] -= c[:, 0].mean()
     return c
+
+
+def parts_of(reference: Array) -> list[Mask]:
+    """The points (2, m) of an image: all, and what is left without one side of it."""
+    sides = [sign * axis for axis in reference for sign in (1, -1)]
+    return [np.ones(reference.shape[1], bool), *(np.asarray(side >= np.quantile(side, PART_LEFT_OUT)) for side in sides)]
 
 
 def convex_finish(nodes: Nodes, edges: Edges, like: Nodes, c: Array, B: Array, stiffness: Array, camera: Camera) -> Array:

@@ -6,14 +6,15 @@ from functools import cached_property
 import numpy as np
 
 from reconstruction import ReconstructionError
-from reconstruction.arrays import Array, Indices
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, stepped
 from reconstruction.mapping.isometric.lengths import Edges, mean_log_lengths
 from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, on_edges, rays_of
 from reconstruction.mapping.isometric.shape_prior import FIRM, ShapePrior, shape_prior
-from reconstruction.mapping.isometric.smooth_field import ENOUGH, SmoothField
+from reconstruction.mapping.isometric.smooth_field import ENOUGH, GROSS, SmoothField, geman_mcclure
 from reconstruction.mapping.isometric.warps import Warps
+from reconstruction.window.robust import lengths
 
 # Lengths of a sheet change by less between its bundled shapes, which hold no noise. By more, they really do (a balloon, a
 # crease), and then no rest shape is right, or bends are finer than its functions.
@@ -152,6 +153,13 @@ class IsometricSheet:
         depth = (step[:, 2] @ B[few].T) / shapes[:, 2, few]
         good = (np.abs(np.log(np.maximum(depth, 1e-9))) < np.log(FARTHEST)).all(axis=1)  # of NaN, too, it is not
         return np.asarray(np.where(good[:, None, None], step, C))
+
+    def weighed(self, shapes: Array, W: Array, seen: Mask) -> Array:
+        """Weights (F, p) px⁻² of points W (F, 2, p) px, seen (F, p), by how far shapes (F, 3, p) are off them."""
+        image = shapes[:, :2] / np.maximum(shapes[:, 2:], 1e-9) * self.camera.focal_px + self.camera.center_px[:, None]
+        off = lengths(W - image) / self.warps.noise_px[:, None]
+        fit = geman_mcclure(off) / self.warps.noise_px[:, None] ** 2
+        return np.where(seen & self.warps.placed & (off < GROSS), fit, 0.0)
 
     def length_change(self, C: Array) -> Array:
         """Change of length (F,) in shapes of coefficients C (F, 3, R), weighted rms: in bundled ones hardly by noise."""

@@ -81,13 +81,13 @@ def smooth_field(nodes: Array, functions: int) -> SmoothField:
 
 def robust_fit(
     B: Array, w: Array, seen: Mask, stiffness: Array, firmness: float, few: Indices | None = None
-) -> tuple[Array, Array, Mask, float]:
+) -> tuple[Array, Array, float]:
     """Smooth function through image points w (2, p), Geman-McClure weights, B (p, r) the functions at the points.
 
     Gross errors must not bend it: it is stiff at first, and made of the first functions and of the few points only.
 
     Returns:
-        coefficients (r, 2), weights (p,), inliers (p,), usual residual of a coordinate.
+        coefficients (r, 2), weights (p,), usual residual of a coordinate.
     """
     every = np.flatnonzero(seen)
     some = every if few is None else spread_rows(seen, few)
@@ -105,10 +105,10 @@ def robust_fit(
             done += 1
             firm = max(firmness, 10.0**-done)
             c, _ = weighted_fit(Bs, ws, h, firm * stiffness[:r])
-            h, off, usual = weights_of(ws - Bs @ c, finest)
-    weights, inlier = np.zeros(len(B)), np.zeros(len(B), bool)
-    weights[every], inlier[every] = h, off < GROSS * usual
-    return c, weights, inlier, usual
+            h, usual = weights_of(ws - Bs @ c, finest)
+    weights = np.zeros(len(B))
+    weights[every] = h
+    return c, weights, usual
 
 
 def weighted_fit(B: Array, target: Array, h: Array, held: Array) -> tuple[Array, Array]:
@@ -119,11 +119,16 @@ def weighted_fit(B: Array, target: Array, h: Array, held: Array) -> tuple[Array,
     return np.linalg.solve(gram, weighted @ target), gram
 
 
-def weights_of(residual: Array, finest: float) -> tuple[Array, Array, float]:
-    """Geman-McClure weights (n,) of residuals (n, 2), their lengths (n,), and the usual residual of a coordinate."""
+def weights_of(residual: Array, finest: float) -> tuple[Array, float]:
+    """Geman-McClure weights (n,) of residuals (n, 2), and the usual residual of a coordinate."""
     off = np.sqrt((residual**2).sum(axis=1))
     usual = max(float(np.partition(off, len(off) // 2)[len(off) // 2]) / 1.1774, finest)  # of a Rayleigh distribution
-    return 1 / (1 + (off / (GROSS * usual)) ** 2) ** 2, off, usual
+    return geman_mcclure(off / usual), usual
+
+
+def geman_mcclure(off: Array) -> Array:
+    """Weights of residuals that are so many times as large as usual."""
+    return np.asarray(1 / (1 + (off / GROSS) ** 2) ** 2)
 
 
 def spread_rows(seen: Mask, few: Indices) -> Indices:

@@ -46,7 +46,6 @@ class Warps:
         placed: (p,) the points that any image shows.
         coefficients: (F, r, 2) of each image, px.
         weights: (F, p) of the observations, 0 where there is none.
-        inlier: (F, p) observations that fit.
         noise_px: (F,) usual distance of an observation from its smooth image: standard deviation of a coordinate.
         firmness: weight of bending, found by generalised cross validation.
     """
@@ -58,7 +57,6 @@ class Warps:
     placed: Mask
     coefficients: Array
     weights: Array
-    inlier: Mask
     noise_px: Array
     firmness: float
 
@@ -109,7 +107,6 @@ class Warps:
             self,
             coefficients=self.coefficients[chosen],
             weights=self.weights[chosen],
-            inlier=self.inlier[chosen],
             noise_px=self.noise_px[chosen],
         )
 
@@ -145,7 +142,7 @@ def on_reference(reference: Array, few: Indices, placed: Mask, functions: int, W
     values = np.zeros((W.shape[2], len(field.stiffness)))
     values[placed] = field.at(reference[:, placed])
     none, nothing, noise = np.zeros((len(W), 0, 2)), np.zeros((len(W), W.shape[2])), np.ones(len(W))
-    empty = Warps(field, reference, values, few, placed, none, nothing, nothing > 0, noise, FIRST_FIRMNESS)
+    empty = Warps(field, reference, values, few, placed, none, nothing, noise, FIRST_FIRMNESS)
     return fitted(empty, W, visible, found_firmness(empty, W, visible))
 
 
@@ -163,8 +160,8 @@ def fitted(warps: Warps, W: Array, visible: Mask, firmness: float) -> Warps:
     """Images W (F, 2, p) px made smooth with the functions of other warps."""
     pairs = zip(W, visible & warps.placed, strict=True)
     fits = [robust_fit(warps.values, w, h, warps.field.stiffness, firmness, warps.few) for w, h in pairs]
-    coefficients, weights, inlier, noise = (np.stack(parts) for parts in zip(*fits, strict=True))
-    return replace(warps, coefficients=coefficients, weights=weights, inlier=inlier, noise_px=noise, firmness=firmness)
+    coefficients, weights, noise = (np.stack(parts) for parts in zip(*fits, strict=True))
+    return replace(warps, coefficients=coefficients, weights=weights, noise_px=noise, firmness=firmness)
 
 
 def quick_fit(warps: Warps, w: Array, visible: Mask, points: Indices) -> tuple[Array, Array, Array]:
@@ -180,10 +177,10 @@ def quick_fit(warps: Warps, w: Array, visible: Mask, points: Indices) -> tuple[A
     rough = few[:, :FEW_FUNCTIONS]
     for sweep in range(ROUGH_SWEEPS):
         c, _ = weighted_fit(rough, target, h, 0.1 ** (sweep + 1) * stiffness[:FEW_FUNCTIONS])
-        h, _, _ = weights_of(target - rough @ c, finest)
+        h, _ = weights_of(target - rough @ c, finest)
     c, gram = weighted_fit(few, target, h, warps.firmness * stiffness)
     image, weights = B @ c, np.zeros(len(B))
-    h, _, usual = weights_of(w[:, every].T - image[every], finest)
+    h, usual = weights_of(w[:, every].T - image[every], finest)
     weights[every] = h / usual**2
     at = B[points]
     return c, usual**2 / h.sum() * ((at @ np.linalg.inv(gram)) * at).sum(axis=1), weights
