@@ -76,3 +76,8 @@ def extrapolated(earlier: State, last: State) -> State:
     """One frame further at constant velocity."""
     turned = quaternion_product(last.q, quaternion_product(earlier.q * CONJUGATE, last.q))
     return State(turned, 2 * last.t - earlier.t, 2 * last.log_s - earlier.log_s, 2 * last.Lambda - earlier.Lambda)
+
+
+def with_newest(frames: State, newest: State) -> State:
+    """The frames with another newest one (n = 1)."""
+    return join([frames[:-1], newest])

@@ -42,8 +42,8 @@ def switch_between(left: Solution, found: Solution) -> Switch | None:
     return Switch(bend, turned, float(found.value.sum() / left.value.sum()))
 
 
-def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask) -> State:
-    """Pose of the first frame with nothing deformed, r = 0: from that of the bootstrap, or as its image is nearest to.
+def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask, rest: Array) -> State:
+    """Pose of a frame by itself, nothing deformed: from that of the bootstrap, or as its image is nearest to.
 
     The latter where that explains the image clearly better: a solid that was lost may have turned to anywhere.
 
@@ -52,6 +52,7 @@ def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask) -> St
         motion: how the rest shape is seen in the first frame.
         W: (2, p) px.
         visible: (p,) which points to use.
+        rest: Λ̄' (3, r) of the undeformed shape.
     """
     data = image_statistics(model, W, visible.astype(np.float64), rigid=True)
     shape, seen = motion.shape[:, visible], W[:, visible] - model.camera.center_px[:, None]
@@ -66,7 +67,7 @@ def first_pose(model: Model, motion: RigidMotion, W: Array, visible: Mask) -> St
         if best is None or found.value[0] < CLEARLY_BETTER * best.value[0]:
             best = found
     assert best
-    return best.state
+    return replace(best.state, Lambda=rest[None].copy())
 
 
 def off_the_saddle(last: State, model: Model) -> State:

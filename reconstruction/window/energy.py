@@ -74,6 +74,11 @@ class Energy:
         edges = self.edges and self.edges.about(centre)
         return replace(self, centre=centre, edges=edges, bending=self.bending and self.bending.about(centre))
 
+    @property
+    def free(self) -> bool:
+        """Whether shapes may deform in any way: those of a solid, which need not be bent, nor keep lengths."""
+        return self.rows == ALL_ROWS and self.edges is None
+
     def completed(self, state: State) -> State:
         """The state with the rows of Λ' that are not estimated filled in."""
         if self.rows == ALL_ROWS:

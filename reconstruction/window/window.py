@@ -8,7 +8,7 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.estimate import ShapeEstimate, Switch
-from reconstruction.state import State, extrapolated, join
+from reconstruction.state import State, extrapolated, join, with_newest
 from reconstruction.window import statistics
 from reconstruction.window.ambiguity import OTHER_BENDS, first_pose, off_the_saddle, other_bend, switch_between
 from reconstruction.window.energy import Energy
@@ -104,7 +104,7 @@ class SlidingWindow:
             self._lost = None
         surprised = self._surprising(found)
         if surprised:
-            found = self._other_bends(window, found)
+            found = self._otherwise(window, found, W, weights)
         window, found = self._reweighted(with_newest(window, found.state), found, W, visible, weights)
         newest = float(found.value[-1])
         # After a surprise the new level is the usual one: it is not asked about twice.
@@ -155,10 +155,13 @@ class SlidingWindow:
     def _started(self, W: Array, weights: Array) -> State:
         """The window with the new frame as it starts, of at most its length."""
         if self.state is None:
-            pose = first_pose(self.model, self._motion, W, weights > RELIABLE)
-            return replace(pose, Lambda=self._rest.rest[None].copy())
+            return self._alone(W, weights)
         window = join([self.state, off_the_saddle(self.state[-1:], self.model)])
         return self._without_oldest(window) if len(window) > self._length else window
+
+    def _alone(self, W: Array, weights: Array) -> State:
+        """A frame as its own image has it, nothing deformed."""
+        return first_pose(self.model, self._motion, W, weights > RELIABLE, self._rest.rest)
 
     def _without_oldest(self, window: State) -> State:
         """The window without its oldest frame, which becomes the one before it and refines the rest shape."""
@@ -178,20 +181,22 @@ class SlidingWindow:
 
     def _surprising(self, found: Solution) -> bool:
         """Whether the newest frame costs so much that the window may be on the wrong branch."""
-        if self._energy.edges is None or self._usual is None:
+        if self._usual is None or (self._energy.edges is None and not self._energy.free):
             return False
         return bool(found.value[-1] > max(SURPRISE * self._usual, LEAST_SURPRISE))
 
-    def _other_bends(self, window: State, found: Solution) -> Solution:
-        """The best of a solution and those with the newest frame undeformed or bent back at the start."""
-        best = found
-        for factors in OTHER_BENDS:
-            bent = other_bend(best.state, factors, self._rest.rest)
-            other = self._newest(with_newest(window, bent))
-            if other.value[0] < BENT_GAIN * best.value[0]:
-                best = other
+    def _otherwise(self, window: State, found: Solution, W: Array, weights: Array) -> Solution:
+        """The best of a solution and others: a sheet starts undeformed or bent back, a solid as its image alone says."""
+        best = self._better(found, window, self._alone(W, weights)) if self._energy.free else found
+        for factors in OTHER_BENDS if self._energy.edges is not None else ():
+            best = self._better(best, window, other_bend(best.state, factors, self._rest.rest))
         self._switch = switch_between(found, best)
         return best
+
+    def _better(self, found: Solution, window: State, start: State) -> Solution:
+        """That of the newest frame or what another start of it leads to, if this costs clearly less."""
+        other = self._newest(with_newest(window, start))
+        return other if other.value[0] < BENT_GAIN * found.value[0] else found
 
     def _reweighted(
         self, window: State, found: Solution, W: Array, visible: Mask, weights: Array
@@ -236,11 +241,6 @@ class SlidingWindow:
         """The newest frame of a window adjusted alone, which takes a fraction of the whole window's time."""
         before = Previous(window[-2:-1]) if len(window) > 1 else self._before
         return minimise(energy or self._energy, self._data[-1], window[-1:], before, solver)
-
-
-def with_newest(window: State, newest: State) -> State:
-    """The window with another newest frame (n = 1)."""
-    return join([window[:-1], newest])
 
 
 def running_mean(mean: float | None, value: float) -> float:

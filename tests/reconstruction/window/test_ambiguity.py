@@ -45,5 +45,5 @@ def test_a_solid_that_was_lost_may_have_turned_to_anywhere(rng: np.random.Genera
     model = model_of(shape, camera, 3)
     motion = RigidMotion(shape, np.eye(3)[None], np.ones(1), np.zeros((1, 2)))
     W = seen(shape[None], random_rotation(rng)[None], camera, depth=1.3)[0][0]
-    pose = first_pose(model, motion, W, half)
+    pose = first_pose(model, motion, W, half, np.zeros((3, 0)))
     np.testing.assert_allclose(model.projection(replace(pose, Lambda=np.zeros((1, 3, 3)))), W, atol=0.1)

@@ -19,6 +19,8 @@ from tests.reconstruction.world import (
     PERSPECTIVE,
     bending_sheet,
     flat,
+    random_rotation,
+    relief,
     rolled,
     seen,
     shape_error,
@@ -58,6 +60,17 @@ def error(estimates: list[ShapeEstimate], truth: np.ndarray) -> float:
 
 def still_error(truth: np.ndarray) -> float:
     return float(e3d(np.broadcast_to(truth[0], truth.shape), truth).mean())
+
+
+@pytest.mark.parametrize("camera", [ORTHOGRAPHIC, PERSPECTIVE])
+def test_a_solid_may_be_seen_from_anywhere_in_the_next_frame(camera: Camera) -> None:
+    rng = np.random.default_rng(0)
+    shape = relief(rng, POINTS)
+    R = np.stack([np.eye(3), *(turn((0.0, 4.0 * k, 0.0)) for k in range(1, 5)), *(random_rotation(rng) for _ in range(12))])
+    window = window_of(shape, camera, "general")
+    found = advanced(window, seen(np.broadcast_to(shape, (len(R), *shape.shape)), R, camera, depth=1.5)[0])
+    assert error(found, R @ shape) < 0.02
+    assert any(one.switch is not None for one in found)
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 8])
