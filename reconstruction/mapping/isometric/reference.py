@@ -52,10 +52,11 @@ def clearest_image(W: Array, visible: Mask) -> int:
     What is seen there from the side or folded over is no function of it in any other image.
     """
     count = visible.sum(axis=1)
-    full = np.flatnonzero(count >= FULL * count.max())
     fullest = int(count.argmax())
     few = np.flatnonzero(visible[fullest])
     few = few[farthest_points(W[fullest][:, few].T, COMPARED)]
+    shared = visible[:, few].sum(axis=1)  # none with the far side of a solid
+    full = np.flatnonzero((count >= FULL * count.max()) & (shared >= min(2, shared.max())))
     apart = []
     for f in full:
         place = W[f][:, few[visible[f, few]]].T

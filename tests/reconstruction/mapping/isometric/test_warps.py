@@ -65,6 +65,14 @@ def test_an_image_of_the_surface_from_the_side_is_no_reference() -> None:
     assert np.median(np.linalg.norm(warps.images() - W, axis=1)) < 1.0
 
 
+@pytest.mark.filterwarnings("error")
+def test_an_image_of_the_far_side_is_compared_with_none_of_the_near_one() -> None:
+    W, _ = waving_sheet(np.random.default_rng(5), points=250, amplitude=0.3)
+    near = np.arange(250) < 125
+    visible = np.concatenate([np.tile(near, (6, 1)), np.tile(~near, (6, 1))])
+    assert clearest_image(np.where(visible[:, None], W, np.nan), visible) < 6
+
+
 def test_an_image_that_shows_hardly_anything_is_told() -> None:
     W, _ = waving_sheet(np.random.default_rng(3), points=120, amplitude=0.3, noise_px=0.0)
     visible = np.ones((12, 120), bool)
