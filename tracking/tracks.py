@@ -62,7 +62,7 @@ class Tracks:
     def load(cls, path: Path) -> Self:
         """Read an .npz file: `W` and optionally `visible` (absent: what is finite), `K`, `S_gt`, `gt_frames` (absent: all).
 
-        Pixels become square.
+        W may be a matrix (2F, P), x and y of frame after frame, and S_gt likewise (3K, P). Pixels become square.
 
         Raises:
             TrackingError: the file is missing, is no .npz, lacks `W`, or its arrays do not fit.
@@ -74,11 +74,13 @@ class Tracks:
                 raise TrackingError(f"{problem}; with W_px it is a file of truth only", "truth")
             raise TrackingError(problem)
         try:
-            W = _numbers("W", arrays)
+            W = _by_frames(_numbers("W", arrays), 2)
             visible = _flags("visible", arrays)
             if visible is None:
                 visible = np.asarray(np.isfinite(W).all(axis=1) if W.ndim == 3 else np.zeros((0, 0), bool))
             given = {name: _numbers(name, arrays) for name in ("K", "S_gt") if name in arrays}
+            if "S_gt" in given:
+                given["S_gt"] = _by_frames(given["S_gt"], 3)
             gt_frames = _frame_numbers(arrays)
             if gt_frames is None and len(given.get("S_gt", [])) == len(W):
                 gt_frames = np.arange(len(W))
@@ -156,7 +158,7 @@ class Truth:
             frames = _frame_numbers(arrays)
             assert frames is not None
             K = _numbers("K", arrays) if "K" in arrays else None
-            return cls(_numbers("W_px", arrays), _numbers("S_gt", arrays), frames, K)
+            return cls(_by_frames(_numbers("W_px", arrays), 2), _by_frames(_numbers("S_gt", arrays), 3), frames, K)
         except TrackingError as error:
             raise TrackingError(f"{path}: {error}") from None
 
@@ -192,6 +194,11 @@ def _numbers(name: str, arrays: Mapping[str, NDArray[Any]]) -> Array:
     if array.dtype.kind not in "fiu":
         raise TrackingError(f"{name} holds {array.dtype}, but numbers are needed")
     return array.astype(np.float64)
+
+
+def _by_frames(array: Array, rows: int) -> Array:
+    """A matrix (F·rows, P), as the literature has it, as (F, rows, P); anything else as it is."""
+    return array.reshape(-1, rows, array.shape[1]) if array.ndim == 2 and len(array) % rows == 0 else array
 
 
 def _flags(name: str, arrays: Mapping[str, NDArray[Any]]) -> Flags | None:

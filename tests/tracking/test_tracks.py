@@ -49,6 +49,14 @@ def test_hidden_entries_may_be_nan(tmp_path: Path, *, told: bool) -> None:
     assert Tracks.load(write(tmp_path, W=NAN_W, **visible)).visible.sum() == F * (P - 1)
 
 
+def test_matrices_have_the_rows_of_frame_after_frame(tmp_path: Path) -> None:
+    path = write(tmp_path, **COMPLETE | {"W": W.reshape(2 * F, P), "S_gt": S.reshape(-1, P)})
+    tracks = Tracks.load(path)
+    np.testing.assert_array_equal(tracks.W, W)
+    assert tracks.S_gt is not None
+    np.testing.assert_array_equal(tracks.S_gt, S)
+
+
 def test_true_shapes_of_all_frames_need_no_numbers(tmp_path: Path) -> None:
     tracks = Tracks.load(write(tmp_path, W=W, S_gt=np.repeat(S[:1], F, axis=0)))
     assert tracks.gt_frames is not None
@@ -60,7 +68,7 @@ def test_true_shapes_of_all_frames_need_no_numbers(tmp_path: Path) -> None:
     [
         ({"W": None}, "has no array W (frames, 2, points), only K, S_gt, gt_frames, visible"),
         ({"W": None, "W_px": W[:2]}, "with W_px it is a file of truth only"),
-        ({"W": W[0]}, "W has the shape (2, 7), but (frames, 2, points) is needed"),
+        ({"W": W[0, :1]}, "W has the shape (1, 7), but (frames, 2, points) is needed"),
         ({"W": np.moveaxis(W, 1, 2)}, "W has the shape (5, 7, 2), but (frames, 2, points) is needed"),
         ({"W": W[:0]}, "W has the shape (0, 2, 7), but"),
         ({"W": NAN_W}, "W has 5 visible entries that are not finite (first: frame 0, point 3)"),
