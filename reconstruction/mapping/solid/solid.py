@@ -1,25 +1,22 @@
 """A solid's rest shape from view-spread keyframes: robust rigid bundle adjustment, by factorisation or from a dome."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from reconstruction import ReconstructionError
-from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.evidence import TURN_DEGREES
 from reconstruction.mapping.factorization import view_turn_degrees
 from reconstruction.mapping.outliers import without_outliers
-from reconstruction.mapping.solid.adjustment import Adjustment
-from reconstruction.mapping.solid.building import Build
 from reconstruction.mapping.solid.bundle import HALF_WIDTH, Bundle, scaled
-from reconstruction.mapping.solid.placing import FEWEST_POINTS, FEWEST_VIEWS, dome, placed_like, well_spread
+from reconstruction.mapping.solid.growth import growth_from
+from reconstruction.mapping.solid.placing import FEWEST_POINTS, FEWEST_VIEWS
 from reconstruction.mapping.solid.spikes import smoothed
-from reconstruction.mapping.solid.views import Likeness, building_order, completed, first_views, likeness, with_unseen
+from reconstruction.mapping.solid.views import first_views, likeness, with_unseen
 
-REPOSINGS, ENOUGH = 5, 0.999  # rounds of posing views anew, while they lower the energy to less than so much of it
 SETTLED = 4  # of those that begin elsewhere, the likeliest as grown, are adjusted until nothing changes
 
 
@@ -58,66 +55,6 @@ class Solid:
         return np.asarray(np.nanmedian(self.residual_px, axis=1))
 
 
-@dataclass(frozen=True)
-class Begun:
-    """Keyframes in the order in which they are built on from one of them.
-
-    Attributes:
-        build: they, in units of what the first shows.
-        order: (K,) which they are.
-        some: the points that are adjusted together with the poses.
-        unit: in px.
-    """
-
-    build: Build
-    order: Indices
-    some: Indices
-    unit: float
-
-    @cached_property
-    def chosen(self) -> Build:
-        """What is adjusted together."""
-        return self.build.of(self.some)
-
-    @cached_property
-    def grown(self) -> Bundle:
-        """Built view by view."""
-        build = self.chosen
-        return build.grown(dome(build.first, build.kappa, flat=build.flat))
-
-    @property
-    def grown_energy(self) -> float:
-        """Of that, an observation, px²; infinite where nothing can be built on its first view."""
-        try:
-            return self.chosen.adjusted(self.grown, Adjustment(steps=0))[1] * self.unit**2
-        except np.linalg.LinAlgError:
-            return float("inf")
-
-    def best(
-        self, known: Array | None = None, *, whole: bool = False, hidden: bool = True, refine: bool
-    ) -> tuple["Begun", Bundle, float]:
-        """Itself, the likeliest bundle and its energy, px²: grown on a dome or a known shape, or the whole at once.
-
-        Where a solid hides its far side, views that do not fit are posed anew.
-        """
-        build = self.chosen
-        both_ways = build.factorized() if whole else []
-        starts = [*both_ways, self.grown]
-        starts += [] if known is None else [build.grown(placed_like(build.first, known[:, self.some]))]
-        found = [build.settled(one, refine=refine) for one in starts]
-        k = int(np.argmin([energy for _, energy in found]))
-        best, energy = found[k]
-        if build.kappa and k >= len(both_ways):
-            other, its_energy = build.settled(best.reversed(), refine=refine)
-            best, energy = (other, its_energy) if its_energy < energy else (best, energy)
-        for _ in range(REPOSINGS if hidden else 0):
-            other, its_energy = build.settled(build.reposed(best), refine=refine)
-            if not its_energy < ENOUGH * energy:
-                break
-            best, energy = other, its_energy
-        return self, best, energy * self.unit**2
-
-
 def bundle_adjust(
     W: Array,
     visible: Mask,
@@ -146,30 +83,18 @@ def bundle_adjust(
     W = np.where(given[:, None], W, 0.0) - camera.center_px[:, None]
     alike = likeness(W, visible)
     views = first_views(alike, visible)[: 1 if flat else None]
-    first, *others = (begun(W, visible, camera, alike, view, flat=flat) for view in views)
+    first, *others = (growth_from(W, visible, camera, alike, view, flat=flat) for view in views)
     ranked = sorted((one.grown_energy, k) for k, one in enumerate(others))
     likely = [others[k] for value, k in ranked[:SETTLED] if np.isfinite(value)]
     found = [first.best(known, whole=not flat, hidden=bool(likely), refine=refine_focal)]
     found += [one.best(refine=refine_focal) for one in likely]
-    begin, best, energy = min(found, key=lambda one: one[2])
-    bundle, order = scaled(begin.build.completed(best, begin.some), begin.unit), begin.order
+    grown, best, energy = min(found, key=lambda one: one[2])
+    bundle, order = scaled(grown.build.completed(best, grown.some), grown.unit), grown.order
     back = np.argsort(order)
     motion = bundle[back].motion.in_first_frame()
     motion = replace(motion, shape=with_unseen(motion.shape, np.asarray(visible.any(axis=0)), known))
     bundle = Bundle(motion, bundle.kappa)
     return describe(W, given, bundle, camera, flat=flat, energy=energy)
-
-
-def begun(W: Array, visible: Mask, camera: Camera, alike: Likeness, view: int, *, flat: bool) -> Begun:
-    """Keyframes W (K, 2, p) px, relative to the principal point, with visibility (K, p), from one view on."""
-    order, parent = building_order(alike, view)
-    first = completed(W, visible, alike, view)
-    unit = float(np.sqrt(np.var(first, axis=1).sum()))
-    scale = np.abs(alike.a[parent, order])  # of each view against that it is built on
-    turn = alike.a[parent, order] / scale
-    place, kappa = np.argsort(order)[parent], unit / camera.focal_px
-    build = Build(W[order] / unit, visible[order].astype(np.float64), first / unit, turn, scale, place, kappa, flat)
-    return Begun(build, order, well_spread(first, visible), unit)
 
 
 def width(shape: Array) -> float:
