@@ -225,7 +225,7 @@ def sheet_map(
     if camera.perspective:
         found = under_its_focal_length(found) if estimate_focal else found
         camera = found.camera
-    found = bundled(found, W, BUNDLE_ROUNDS if last else FEW_ROUNDS, weighed=camera.perspective)
+    found = bundled(found, W, BUNDLE_ROUNDS if last else FEW_ROUNDS)
     if last and camera.perspective and found.stretch > USUAL_STRETCH:
         found = bundled(refined(found, W, visible), W)
     shapes = found.shapes()

@@ -144,14 +144,13 @@ def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:
     return by_part(replace(found, camera=replace(found.camera, focal_px=focal_px)), np.arange(len(found.coefficients)))
 
 
-def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS, *, weighed: bool = True) -> IsometricSheet:
+def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> IsometricSheet:
     """The sheet with shapes, lengths and the places of its points on the reference image adjusted together.
 
     Args:
         found: what its keyframes say, image by image.
         W: (F, 2, p) px, its keyframes; anything where not visible.
         rounds: of shapes, then places and lengths.
-        weighed: points are weighed by how far the shapes are off them; else for good by how far they are off smooth images.
 
     Raises:
         ReconstructionError: a part of it comes out behind the camera.
@@ -161,7 +160,7 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS, *, wei
     rays, way = rays_of(W, found.camera)[:, :2, placed], np.zeros(len(found.log_lengths))
     for k in range(rounds):
         prior = found.prior_of(shapes, FIRM if k >= ROUGH_ROUNDS else ROUGH, of_others=True)
-        if weighed or k == 0:
+        if k == 0 or not found.far:
             weights = found.weighed(shapes, W, seen)
         C = found.bundled(shapes, W, weights, prior)
         places = found.warps.reference.copy()

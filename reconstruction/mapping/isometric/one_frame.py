@@ -21,7 +21,8 @@ RENEWED = 0.3  # weight of the newest frame in the usual change of lengths
 DOUBTED = 1.3  # times the usual change of length: the frame may be in another minimum
 STARTS, STEPS = 6, 3  # keyframes that a frame in doubt starts from, and steps of depths: they are only the start
 ALIKE = 0.05  # of the depth's relief: shapes that differ by less are one
-MOST, BUNDLED = 3, 2  # different ones are bundled in so many steps
+MOST = 4  # different ones are bundled
+STEPS_USUALLY, STEPS_IN_DOUBT = 2, 8  # of bundling: after a few, a wrong shape may still cost less than the right one
 
 
 @dataclass(frozen=True)
@@ -91,13 +92,13 @@ def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, 
     for k in range(1, len(ends)):
         if all(np.abs(depths[k] - depths[one]).mean() > ALIKE * np.abs(depths[one]).mean() for one in different):
             different.append(k)
-    return cheapest(sheet, ends[different[:MOST]], W, weights)
+    return cheapest(sheet, ends[different[:MOST]], W, weights, STEPS_USUALLY if sheet.far else STEPS_IN_DOUBT)
 
 
-def cheapest(sheet: IsometricSheet, shapes: Array, W: Array, weights: Array) -> Array:
-    """Coefficients (1, 3, R) of that of shapes (G, 3, p) in one frame which costs least, once they are bundled."""
+def cheapest(sheet: IsometricSheet, shapes: Array, W: Array, weights: Array, steps: int = STEPS_USUALLY) -> Array:
+    """Coefficients (1, 3, R) of that of shapes (G, 3, p) in one frame which costs least, once bundled in so many steps."""
     seen = [np.broadcast_to(one, (len(shapes), *one.shape)) for one in (W, weights)]
-    for _ in range(BUNDLED):
+    for _ in range(steps):
         C = sheet.bundled(shapes, seen[0], seen[1], sheet.prior)
         shapes = C @ sheet.functions.T
     return np.asarray(C[[sheet.cost(C, W, weights).argmin()]])

@@ -19,6 +19,7 @@ from reconstruction.window.robust import lengths
 # Lengths of a sheet change by less between its bundled shapes, which hold no noise. By more, they really do (a balloon, a
 # crease), and then no rest shape is right, or bends are finer than its functions.
 USUAL_STRETCH = 0.0042
+FAR = 30.0  # focal length over the images' size, RMS, from which on perspective tells nothing
 FARTHEST = 1.5  # times as deep as before, or less deep: a step that goes further has lost its way, and is not taken
 
 
@@ -68,6 +69,12 @@ class IsometricSheet:
         weights = self.edge_weights / (1 + squared / USUAL_STRAIN**2)
         by_noise = float((weights * squared).sum() / max(weights.sum(), 1e-12))
         return float(np.sqrt(max(self.strain_rms**2 - by_noise, 0.0)))
+
+    @cached_property
+    def far(self) -> bool:
+        """Whether it is too far away for perspective to tell a shape from its mirror image: no use in looking further."""
+        size = np.median(np.sqrt(self.nodes.images.var(axis=2).sum(axis=1)))
+        return bool(self.camera.focal_px > FAR * size)
 
     @cached_property
     def stretch(self) -> float:
