@@ -76,8 +76,8 @@ class Energy:
 
     @property
     def free(self) -> bool:
-        """Whether shapes may deform in any way: those of a solid, which need not be bent, nor keep lengths."""
-        return self.rows == ALL_ROWS and self.edges is None
+        """Whether shapes may deform in any way, as near as they like: those of a solid."""
+        return self.rows == ALL_ROWS and self.edges is None and self.free_scale
 
     def completed(self, state: State) -> State:
         """The state with the rows of Λ' that are not estimated filled in."""

@@ -9,13 +9,13 @@ from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.estimate import ShapeEstimate, Switch
 from reconstruction.state import State, extrapolated, join, with_newest
-from reconstruction.window import statistics
-from reconstruction.window.ambiguity import OTHER_BENDS, first_pose, off_the_saddle, other_bend, switch_between
+from reconstruction.window import ambiguity, statistics
+from reconstruction.window.ambiguity import CLEARLY_BETTER, OTHER_BENDS, first_pose, off_the_saddle, other_bend
 from reconstruction.window.energy import Energy
 from reconstruction.window.marginal import Previous, carried, information_of
 from reconstruction.window.priors import FIRMEST, FITTING
 from reconstruction.window.refinement import Refinement
-from reconstruction.window.robust import robust_weights, start_weights
+from reconstruction.window.robust import FEWEST_POINTS, robust_weights, start_weights
 from reconstruction.window.smoothness import deformation_change
 from reconstruction.window.solver import Solution, Solver, minimise, one_step
 from reconstruction.window.statistics import Statistics, image_statistics, stack
@@ -187,16 +187,18 @@ class SlidingWindow:
 
     def _otherwise(self, window: State, found: Solution, W: Array, weights: Array) -> Solution:
         """The best of a solution and others: a sheet starts undeformed or bent back, a solid as its image alone says."""
-        best = self._better(found, window, self._alone(W, weights)) if self._energy.free else found
+        best = found
+        if self._energy.free and (weights > RELIABLE).sum() >= FEWEST_POINTS:
+            best = self._better(best, window, self._alone(W, weights), CLEARLY_BETTER)
         for factors in OTHER_BENDS if self._energy.edges is not None else ():
             best = self._better(best, window, other_bend(best.state, factors, self._rest.rest))
-        self._switch = switch_between(found, best)
+        self._switch = ambiguity.switch_between(found, best)
         return best
 
-    def _better(self, found: Solution, window: State, start: State) -> Solution:
+    def _better(self, found: Solution, window: State, start: State, gain: float = BENT_GAIN) -> Solution:
         """That of the newest frame or what another start of it leads to, if this costs clearly less."""
         other = self._newest(with_newest(window, start))
-        return other if other.value[0] < BENT_GAIN * found.value[0] else found
+        return other if other.value[0] < gain * found.value[0] else found
 
     def _reweighted(
         self, window: State, found: Solution, W: Array, visible: Mask, weights: Array

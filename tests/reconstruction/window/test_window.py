@@ -13,6 +13,7 @@ from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import e3d
 from reconstruction.settings import Deformation
 from reconstruction.window.energy import build_energy, build_guide
+from reconstruction.window.robust import FEWEST_POINTS
 from reconstruction.window.window import SlidingWindow
 from tests.reconstruction.world import (
     ORTHOGRAPHIC,
@@ -71,6 +72,23 @@ def test_a_solid_may_be_seen_from_anywhere_in_the_next_frame(camera: Camera) -> 
     found = advanced(window, seen(np.broadcast_to(shape, (len(R), *shape.shape)), R, camera, depth=1.5)[0])
     assert error(found, R @ shape) < 0.02
     assert any(one.switch is not None for one in found)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("shown", range(6))
+def test_a_solid_that_surprises_by_few_points_is_posed_anew_by_enough_of_them_alone(shown: int) -> None:
+    rng = np.random.default_rng(1)
+    shape = relief(rng, POINTS)
+    R = np.stack([turn((0.0, 3.0 * k, 0.0)) for k in range(7)])
+    W = seen(np.broadcast_to(shape, (7, *shape.shape)), R, PERSPECTIVE, depth=1.5)[0]
+    visible = np.ones((7, POINTS), bool)
+    visible[5] = np.arange(POINTS) < shown
+    W[5] += 60 * rng.standard_normal(W[5].shape)
+    found = advanced(window_of(shape, PERSPECTIVE, "general"), W, visible)
+    assert np.isfinite(shapes_of(found)).all()
+    if shown < FEWEST_POINTS:
+        assert error(found[-1:], R[-1:] @ shape) < 0.03
+        assert found[5].switch is None
 
 
 @pytest.mark.parametrize("length", [1, 2, 3, 8])
