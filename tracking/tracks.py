@@ -13,6 +13,7 @@ from tracking import Array, Flags, Indices, TrackingError
 from tracking.extent import LARGEST, check_extent
 
 LARGEST_BYTES = 4 * 2**30  # of arrays in a file
+ROWS = {"W": 2, "W_px": 2, "S_gt": 3}  # of a frame, in matrices (2F, P) and (3K, P) as the literature has them
 SKEW = 1e-3  # of the focal length: more is no ordinary camera
 
 
@@ -74,13 +75,11 @@ class Tracks:
                 raise TrackingError(f"{problem}; with W_px it is a file of truth only", "truth")
             raise TrackingError(problem)
         try:
-            W = _by_frames(_numbers("W", arrays), 2)
+            W = _numbers("W", arrays)
             visible = _flags("visible", arrays)
             if visible is None:
                 visible = np.asarray(np.isfinite(W).all(axis=1) if W.ndim == 3 else np.zeros((0, 0), bool))
             given = {name: _numbers(name, arrays) for name in ("K", "S_gt") if name in arrays}
-            if "S_gt" in given:
-                given["S_gt"] = _by_frames(given["S_gt"], 3)
             gt_frames = _frame_numbers(arrays)
             if gt_frames is None and len(given.get("S_gt", [])) == len(W):
                 gt_frames = np.arange(len(W))
@@ -158,7 +157,7 @@ class Truth:
             frames = _frame_numbers(arrays)
             assert frames is not None
             K = _numbers("K", arrays) if "K" in arrays else None
-            return cls(_by_frames(_numbers("W_px", arrays), 2), _by_frames(_numbers("S_gt", arrays), 3), frames, K)
+            return cls(_numbers("W_px", arrays), _numbers("S_gt", arrays), frames, K)
         except TrackingError as error:
             raise TrackingError(f"{path}: {error}") from None
 
@@ -193,12 +192,10 @@ def _numbers(name: str, arrays: Mapping[str, NDArray[Any]]) -> Array:
     array = arrays[name]
     if array.dtype.kind not in "fiu":
         raise TrackingError(f"{name} holds {array.dtype}, but numbers are needed")
+    rows = ROWS.get(name)
+    if rows and array.ndim == 2 and len(array) % rows == 0:
+        array = array.reshape(-1, rows, array.shape[1])
     return array.astype(np.float64)
-
-
-def _by_frames(array: Array, rows: int) -> Array:
-    """A matrix (F·rows, P), as the literature has it, as (F, rows, P); anything else as it is."""
-    return array.reshape(-1, rows, array.shape[1]) if array.ndim == 2 and len(array) % rows == 0 else array
 
 
 def _flags(name: str, arrays: Mapping[str, NDArray[Any]]) -> Flags | None:

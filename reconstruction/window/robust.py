@@ -73,7 +73,12 @@ def off_the_common_motion(shape: Array, W: Array, visible: Mask, limit: float) -
 
 def fit_weights(off: Array, *, close: bool) -> Array:
     """Weights of entries so many deviations off: Geman-McClure's, or those that make far ones count linearly."""
-    return 1 / (1 + (off / CLOSE_SIGMAS) ** 2) ** 2 if close else 1 / (1 + off)
+    return geman_mcclure(off / CLOSE_SIGMAS) if close else 1 / (1 + off)
+
+
+def geman_mcclure(off: Array) -> Array:
+    """Weights of entries by how far off they are, over what is far."""
+    return np.asarray(1 / (1 + off**2) ** 2)
 
 
 def lengths(vectors: Array) -> Array:

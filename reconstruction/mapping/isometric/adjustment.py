@@ -31,6 +31,7 @@ from reconstruction.mapping.isometric.shape_prior import FIRM, ROUGH
 from reconstruction.mapping.isometric.sheet import IsometricSheet, described
 from reconstruction.mapping.isometric.smooth_field import smooth_field
 from reconstruction.mapping.isometric.warps import Warps, finer, smooth_warps
+from reconstruction.window.robust import geman_mcclure
 
 FUNCTIONS, FINE_FUNCTIONS = 40, 60
 START_FRAMES = 10  # of the convex start
@@ -238,7 +239,7 @@ def once_more(seen: Edges, edges: Edges, c: Array, stiffness: Array, starts: Seq
         coefficients (F, r); factors (n,) of the edges' weights: small for those that do not keep their length.
     """
     logs, _, change = robust_lengths(edges, edges.log_lengths(c))
-    factor = 1 / (1 + (change / (DOUBTFUL * np.median(change) + 1e-12)) ** 2) ** 2
+    factor = geman_mcclure(change / (DOUBTFUL * np.median(change) + 1e-12))
     edges = seen.weighted(factor)
     c = best_start(edges, logs, [c, *starts], stiffness, SOLVER.bend)
     c[:, 0] -= c[:, 0].mean()

@@ -7,6 +7,7 @@ from scipy.linalg.blas import dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dposv
 
 from reconstruction.arrays import Array, Indices
+from reconstruction.window.robust import geman_mcclure
 
 FARTHEST = 50.0  # logarithm of a depth, so that squares stay numbers
 HOPELESS = 1e4  # damping with which no step helps
@@ -231,7 +232,7 @@ def robust_lengths(edges: Edges, g: Array) -> tuple[Array, Array, Array]:
         logs = (weights * g).sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-12)
         squared = edges.weights * (g - logs) ** 2
         off = np.sqrt(squared.sum(axis=1) / np.maximum(edges.weights.sum(axis=1), 1e-12))
-        h = (1 / (1 + (off / (2 * np.median(off) + 1e-12)) ** 2) ** 2)[:, None]
+        h = geman_mcclure(off / (2 * np.median(off) + 1e-12))[:, None]
     by_edge = np.sqrt((h * squared).sum(axis=0) / np.maximum((h * edges.weights).sum(axis=0), 1e-12))
     return logs, off, by_edge
 

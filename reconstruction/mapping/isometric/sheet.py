@@ -12,9 +12,9 @@ from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, da
 from reconstruction.mapping.isometric.lengths import Edges, mean_log_lengths
 from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, on_edges, rays_of
 from reconstruction.mapping.isometric.shape_prior import FIRM, ShapePrior, shape_prior
-from reconstruction.mapping.isometric.smooth_field import ENOUGH, GROSS, SmoothField, geman_mcclure
+from reconstruction.mapping.isometric.smooth_field import ENOUGH, GROSS, SmoothField
 from reconstruction.mapping.isometric.warps import Warps
-from reconstruction.window.robust import lengths
+from reconstruction.window.robust import geman_mcclure, lengths
 
 # Lengths of a sheet change by less between its bundled shapes, which hold no noise. By more, they really do (a balloon, a
 # crease), and then no rest shape is right, or bends are finer than its functions.
@@ -161,11 +161,16 @@ class IsometricSheet:
         good = (np.abs(np.log(np.maximum(depth, 1e-9))) < np.log(FARTHEST)).all(axis=1)  # of NaN, too, it is not
         return np.asarray(np.where(good[:, None, None], step, C))
 
+    def residuals(self, shapes: Array, W: Array) -> Array:
+        """How far (F, 2, p) px shapes (F, 3, p) are seen off points W (F or 1, 2, p) px; very far behind the camera."""
+        depth = np.maximum(shapes[:, 2:], 1e-9)
+        return self.camera.project(np.concatenate([shapes[:, :2], depth], axis=1)) - W
+
     def weighed(self, shapes: Array, W: Array, seen: Mask) -> Array:
         """Weights (F, p) px⁻² of points W (F, 2, p) px, seen (F, p), by how far shapes (F, 3, p) are off them."""
-        image = shapes[:, :2] / np.maximum(shapes[:, 2:], 1e-9) * self.camera.focal_px + self.camera.center_px[:, None]
-        off = lengths(W - image) / self.warps.noise_px[:, None]
-        fit = geman_mcclure(off) / self.warps.noise_px[:, None] ** 2
+        noise = self.warps.noise_px[:, None]
+        off = lengths(self.residuals(shapes, W)) / noise
+        fit = geman_mcclure(off / GROSS) / noise**2
         return np.where(seen & self.warps.placed & (off < GROSS), fit, 0.0)
 
     def length_change(self, C: Array) -> Array:
@@ -175,8 +180,7 @@ class IsometricSheet:
 
     def cost(self, C: Array, W: Array, weights: Array) -> Array:
         """What bundling lowers (F,); C (F, 3, R), W (2, p) px and weights (p,) of the frame seen in all."""
-        X = C @ self.functions.T
-        off = X[:, :2] / np.maximum(X[:, 2:], 1e-9) * self.camera.focal_px + self.camera.center_px[:, None] - W
+        off = self.residuals(C @ self.functions.T, W)
         total = float(self.edge_weights.sum())
         return np.asarray(
             np.where(weights > 0, weights * (off**2).sum(axis=1), 0.0).sum(axis=1)
@@ -201,7 +205,7 @@ class IsometricSheet:
         few = self.warps.few
         if (shapes[:, 2, few] <= 0).any():
             raise ReconstructionError("the sheet comes out behind the camera: what the keyframes show is none")
-        image = shapes[:, :2, few] / shapes[:, 2:, few] * self.camera.focal_px + self.camera.center_px[:, None]
+        image = self.camera.project(shapes[:, :, few])
         to_images, to_depths = (np.linalg.pinv(B[few]) for B in (self.warps.values, self.values))
         warps = replace(self.warps, coefficients=to_images @ image.transpose(0, 2, 1))
         nodes = replace(self.nodes, images=warps.images(self.nodes.points), middles=warps.images_at(self.nodes.halfway))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.window.robust import geman_mcclure
 
 FEW_FUNCTIONS = 40  # where bending is held firmly
 ROUGH_SWEEPS = 4  # of re-weighting, with few functions and few points
@@ -123,12 +124,7 @@ def weights_of(residual: Array, finest: float) -> tuple[Array, float]:
     """Geman-McClure weights (n,) of residuals (n, 2), and the usual residual of a coordinate."""
     off = np.sqrt((residual**2).sum(axis=1))
     usual = max(float(np.partition(off, len(off) // 2)[len(off) // 2]) / 1.1774, finest)  # of a Rayleigh distribution
-    return geman_mcclure(off / usual), usual
-
-
-def geman_mcclure(off: Array) -> Array:
-    """Weights of residuals that are so many times as large as usual."""
-    return np.asarray(1 / (1 + (off / GROSS) ** 2) ** 2)
+    return geman_mcclure(off / (GROSS * usual)), usual
 
 
 def spread_rows(seen: Mask, few: Indices) -> Indices:

@@ -9,6 +9,7 @@ from reconstruction.basis.mesh import farthest_points
 from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.mapping.solid.bundle import Bundle
+from reconstruction.window.robust import geman_mcclure
 
 FEWEST_VIEWS, FEWEST_POINTS = 3, 6
 MOST_POINTS = 1000  # are adjusted together with the poses; of dense ones the others are placed afterwards
@@ -56,7 +57,7 @@ def resection(shape: Array, image: Array, rounds: int = 1) -> tuple[Array, float
         X, u = shape - (shape @ w)[:, None], image - (image @ w)[:, None]
         affine = (u * w) @ X.T @ np.linalg.pinv((X * w) @ X.T, rcond=1e-9, hermitian=True)
         off = np.linalg.norm(u - affine @ X, axis=0)
-        h = 1 / (1 + (off / (2 * np.median(off) + 1e-12)) ** 2) ** 2
+        h = geman_mcclure(off / (2 * np.median(off) + 1e-12))
     U, size, Vt = np.linalg.svd(affine, full_matrices=False)
     rows = U @ Vt
     return np.concatenate([rows, np.cross(rows[0], rows[1])[None]]), float(size.mean())
