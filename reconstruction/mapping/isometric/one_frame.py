@@ -23,6 +23,7 @@ STARTS, STEPS = 6, 3  # keyframes that a frame in doubt starts from, and steps o
 ALIKE = 0.05  # of the depth's relief: shapes that differ by less are one
 MOST = 4  # different ones are bundled
 STEPS_USUALLY, STEPS_IN_DOUBT = 2, 8  # of bundling: after a few, a wrong shape may still cost less than the right one
+SETTLED = 0.999  # of its cost before: a shape that costs more after a step has come to its end
 
 
 @dataclass(frozen=True)
@@ -96,12 +97,20 @@ def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, 
 
 
 def cheapest(sheet: IsometricSheet, shapes: Array, W: Array, weights: Array, steps: int = STEPS_USUALLY) -> Array:
-    """Coefficients (1, 3, R) of that of shapes (G, 3, p) in one frame which costs least, once bundled in so many steps."""
-    seen = [np.broadcast_to(one, (len(shapes), *one.shape)) for one in (W, weights)]
+    """Coefficients (1, 3, R) of that of shapes (G, 3, p) in one frame which costs least, bundled in up to so many steps."""
+    best, least = np.empty(0), np.inf
+    costs = np.full(len(shapes), np.inf)
     for _ in range(steps):
-        C = sheet.bundled(shapes, seen[0], seen[1], sheet.prior)
-        shapes = C @ sheet.functions.T
-    return np.asarray(C[[sheet.cost(C, W, weights).argmin()]])
+        seen = [np.broadcast_to(one, (len(shapes), *one.shape)) for one in (W, weights)]
+        C = sheet.bundled(shapes, *seen, sheet.prior)
+        before, costs = costs, sheet.cost(C, W, weights)
+        if costs.min() < least:
+            best, least = C[[costs.argmin()]], costs.min()
+        going = costs < SETTLED * before
+        if not going.any():
+            break
+        shapes, costs = C[going] @ sheet.functions.T, costs[going]
+    return best
 
 
 def mended(found: IsometricSheet, C: Array, W: Array, weights: Array) -> Array:
