@@ -1,6 +1,7 @@
 """Frames with true time stamps from a file, an image pattern, a camera or a URL."""
 
 import threading
+from collections import deque
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ from tracking.sources.capture import (
 
 DEFAULT_FPS = 30.0  # of sources that do not tell
 DECODE_AHEAD = 4  # frames waiting in the queue: enough to hide decoding, little memory
+LATE_S = 0.05  # frames of a live source that have waited for longer may be dropped: a short stall costs none
 BROKEN_FRAMES = 30  # so many unreadable frames in a row end the source
 
 
@@ -54,7 +56,7 @@ class Video:
         first: index of the first frame delivered.
         stop: index of the first frame not delivered any more; None reads to the end.
         duration_s: so long after the first frame the video ends; None for no limit.
-        drop_late: of a live source, deliver always the newest frame and drop those nobody had time for.
+        drop_late: of a live source, drop frames that nobody had time for within 50 ms, unless they are the newest.
         log: told in words what is unusual: pixels, missing images, and, in another thread, that a stream breaks or resumes.
 
     Attributes:
@@ -93,7 +95,7 @@ class Video:
         if drop_late and not self.live:
             self._capture.release()
             raise TrackingError(f"{source} is no camera or stream: frames of a file are never late", "drop_late")
-        self._newest_only = drop_late
+        self._drop_late = drop_late
         self._began = monotonic()
         self._index = 0  # of the next frame grabbed
         self._time_s = -np.inf
@@ -118,7 +120,7 @@ class Video:
             self.frame_count = max(end - frame.index, 1)
             if duration_s is not None:
                 self.frame_count = min(self.frame_count, int(duration_s * self.fps) + 1)
-        self._queue: Queue[Frame | BaseException | None] = Queue(1 if drop_late else DECODE_AHEAD)
+        self._queue: Queue[Frame | BaseException | None] = Queue(0 if drop_late else DECODE_AHEAD)
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> Self:
@@ -167,15 +169,13 @@ class Video:
             self._put(error)
 
     def _put(self, item: Frame | BaseException | None) -> bool:
-        newest = self._newest_only and isinstance(item, Frame)
+        if self._drop_late and isinstance(item, Frame):
+            with self._queue.mutex:
+                leave_out_late(self._queue.queue, item.time_s)
         while not self._closing.is_set():
-            try:
-                self._queue.put(item, timeout=0.0 if newest else 0.1)
+            with suppress(Full):
+                self._queue.put(item, timeout=0.1)
                 return True
-            except Full:
-                if newest:
-                    with suppress(Empty):
-                        self._queue.get_nowait()
         return False
 
     def _skip_to(self, first: int) -> None:
@@ -240,3 +240,9 @@ class Video:
             )
         named = f" (codec {codec})" if codec.isprintable() and codec else ""
         return TrackingError(f"{self.source} has no frame that can be decoded{named}; convert it to H.264 with ffmpeg")
+
+
+def leave_out_late(waiting: deque[Frame | BaseException | None], now_s: float) -> None:
+    """Take those frames out of a queue that came too long ago for anyone to want them."""
+    while waiting and isinstance(waiting[0], Frame) and now_s - waiting[0].time_s > LATE_S:
+        waiting.popleft()

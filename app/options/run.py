@@ -82,7 +82,7 @@ class Source:
     duration: float | None = None
     """Stop so many seconds after the first frame."""
     drop_late: bool = False
-    """Of a camera or stream, take always the newest frame, and leave out those there is no time for."""
+    """Of a camera or stream, leave out frames that nobody had time for within 50 ms."""
     full_size: bool = False
     """Follow points in the pictures as they are, and record those; without it, copies of those 2560 px wide and more.
     Pixels of the results are the pictures' either way."""

@@ -98,19 +98,18 @@ def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, 
 
 def cheapest(sheet: IsometricSheet, shapes: Array, W: Array, weights: Array, steps: int = STEPS_USUALLY) -> Array:
     """Coefficients (1, 3, R) of that of shapes (G, 3, p) in one frame which costs least, bundled in up to so many steps."""
-    best, least = np.empty(0), np.inf
-    costs = np.full(len(shapes), np.inf)
+    least, costs = np.inf, np.full(len(shapes), np.inf)
     for _ in range(steps):
         seen = [np.broadcast_to(one, (len(shapes), *one.shape)) for one in (W, weights)]
-        C = sheet.bundled(shapes, *seen, sheet.prior)
+        C = sheet.bundled(shapes, seen[0], seen[1], sheet.prior)
         before, costs = costs, sheet.cost(C, W, weights)
-        if costs.min() < least:
+        if not costs.min() >= least:  # at first
             best, least = C[[costs.argmin()]], costs.min()
         going = costs < SETTLED * before
         if not going.any():
             break
         shapes, costs = C[going] @ sheet.functions.T, costs[going]
-    return best
+    return np.asarray(best)
 
 
 def mended(found: IsometricSheet, C: Array, W: Array, weights: Array) -> Array:

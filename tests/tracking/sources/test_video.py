@@ -1,6 +1,7 @@
 """Frames with their times: files, ranges, ends."""
 
 import threading
+from collections import deque
 from pathlib import Path
 
 import cv2
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from tracking import TrackingError
-from tracking.video import Frame, Video
+from tracking.video import Frame, Video, leave_out_late
 
 AV1 = Path(__file__).with_name("data") / "av1.mp4"
 
@@ -73,6 +74,18 @@ def test_an_error_while_iterating_ends_the_decoding_thread(movie: Path) -> None:
     with pytest.raises(RuntimeError):
         fail()
     assert not [t for t in threading.enumerate() if t.name == "decode"]
+
+
+def test_only_frames_that_nobody_had_time_for_are_late() -> None:
+    came = [Frame(k, time_s, picture(k)) for k, time_s in enumerate([0.0, 0.02, 0.04, 0.06])]
+    waiting = deque[Frame | BaseException | None](came)
+    leave_out_late(waiting, 0.05)
+    assert len(waiting) == 4
+    leave_out_late(waiting, 0.08)
+    assert list(waiting) == came[2:]
+    waiting = deque[Frame | BaseException | None]([None])
+    leave_out_late(waiting, 9.0)
+    assert list(waiting) == [None]
 
 
 @pytest.mark.parametrize(

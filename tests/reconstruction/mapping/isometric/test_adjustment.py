@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.isometric.adjustment import bundled, in_halves, sheet
 from reconstruction.mapping.isometric.focal import under_its_focal_length
-from reconstruction.mapping.isometric.one_frame import shape_in
+from reconstruction.mapping.isometric.one_frame import cheapest, shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 from tests.reconstruction.world import turns, views
@@ -175,6 +176,25 @@ def test_frames_in_another_minimum_are_found_again() -> None:
     W, S, found = waving()
     wrong = replace(found, coefficients=np.flip(found.coefficients, axis=0))  # every frame would start badly
     assert float(e3d(in_frames(wrong, W), S).mean()) < 0.03
+
+
+def test_a_frame_is_bundled_until_its_shapes_cost_no_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    (W, _, found), once, counts = waving(), IsometricSheet.bundled, list[int]()
+    weights = np.full(150, found.warps.noise_px[3] ** -2)
+
+    def counted(self: IsometricSheet, shapes: np.ndarray, *others: Any) -> np.ndarray:
+        counts.append(len(shapes))
+        return once(self, shapes, *others)
+
+    monkeypatch.setattr(IsometricSheet, "bundled", counted)
+    cost = found.cost(cheapest(found, found.shapes()[[2, 3]], W[3], weights, 100), W[3], weights)[0]
+    assert counts[0] == 2
+    assert counts[-1] == 1  # one goes on alone
+    assert 2 < len(counts) < 30
+    C = found.shapes()[[3]][:, :, found.warps.few] @ found.projector
+    for _ in range(100):
+        C = once(found, C @ found.functions.T, W[[3]], weights[None], found.prior)
+    assert cost < 1.02 * found.cost(C, W[3], weights)[0]
 
 
 def test_points_of_their_own_are_no_sheet() -> None:
