@@ -13,44 +13,30 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS as FINE_SHAPES
-from reconstruction.mapping.isometric.bundle import places_moved
-from reconstruction.mapping.isometric.convex import convex_finish, convex_start, parts_of
+from reconstruction.mapping.isometric.bundle import GIVE, places_moved
 from reconstruction.mapping.isometric.lengths import (
-    Edges,
-    Solver,
     adjust_depths,
-    best_start,
     finish_depths,
-    mean_log_lengths,
-    robust_lengths,
-    usual,
 )
-from reconstruction.mapping.isometric.nodes import Nodes, edges_between, nearest, nodes_of, on_edges, rays_of
+from reconstruction.mapping.isometric.nodes import edges_between, nodes_of, on_edges, rays_of
 from reconstruction.mapping.isometric.one_frame import mended
 from reconstruction.mapping.isometric.shape_prior import FIRM, ROUGH
 from reconstruction.mapping.isometric.sheet import IsometricSheet, described
 from reconstruction.mapping.isometric.smooth_field import smooth_field
+from reconstruction.mapping.isometric.starts import SOLVER, again, first_depths, once_more
 from reconstruction.mapping.isometric.warps import Warps, finer, smooth_warps
-from reconstruction.window.robust import geman_mcclure
 
 FUNCTIONS, FINE_FUNCTIONS = 40, 60
-START_FRAMES = 10  # of the convex start
 BUNDLE_ROUNDS = 12  # of shapes, then places and lengths: with much noise they are still getting better
 FEW_ROUNDS = 2  # bring most of that in a tenth of a second
 ROUGH_ROUNDS = 2  # in which shapes and lengths lose their noise; after those, lengths go on the way they went
 GOING_ON = 0.7  # of the way of the round before: alone, each round goes a part of it only
 SETTLED = 2e-4  # of the shapes' size: a round that moves them less is the last
 ROUNDS = 6  # at most, of starting frames again that do not fit
-OTHER_STARTS = 2
-FIRM_START = 100.0  # times the bending weight, before it is let go
-DOUBTFUL = 3.0  # times the usual change of length
-LITTLE_CHANGE = 0.006  # usual change of length, with which a start is good
-TORN = 2.5  # the worst edges' change over the usual one: strays spoil the start
 LITTLE_GAIN = 0.1  # of the change: a round that brought less is the last
 MOST_CHANGE = 0.06  # of lengths, rms, noise apart: no cloth seems to, with folds cut off; less is weighed against a solid
 MOST_AT_ALL = 0.08  # with noise: what is that far off smooth images is not noise
 MOST_PARALLAX = 0.01  # over the image's RMS radius: true sheets up to 0.5 %, by noise; what is seen through 1.5 % and more
-SOLVER = Solver()
 
 
 def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
@@ -137,7 +123,7 @@ def refined(found: IsometricSheet, W: Array, visible: Mask) -> IsometricSheet:
     c, factor = once_more(seen, seen, c, field.stiffness)
     c, factor = again(nodes, seen, seen.weighted(factor), c, B, field.stiffness, found.camera)
     finer_one = described(warps, nodes, field, values, c, factor, found.camera, found.bend, FINE_SHAPES)
-    return replace(finer_one, by_focal=found.by_focal)
+    return replace(finer_one, by_focal=found.by_focal, give=found.give)
 
 
 def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:
@@ -171,76 +157,9 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
         way = GOING_ON * way if k >= ROUGH_ROUNDS else 0 * way
         way = way + np.median(found.lengths.now(C)[0], axis=0) - found.log_lengths
         found = replace(found, log_lengths=found.log_lengths + way)
+        found = replace(found, give=max(GIVE, float(np.median(found.length_change(C)))))
         before, shapes = shapes, C @ found.functions.T
         if np.sqrt(np.nanmean((shapes - before) ** 2)) < SETTLED * np.nanstd(before):
             break
     C = mended(found, C, W, weights)
     return replace(found.with_shapes(C @ found.functions.T), usual_change=float(np.median(found.length_change(C))))
-
-
-def first_depths(nodes: Nodes, seen: Edges, B: Array, stiffness: Array, camera: Camera) -> Array:
-    """Coefficients (F, r): a convex start on the first frames, adjusted, and the others with its lengths.
-
-    Points of something else at a border spoil the start: where lengths change much, others are tried, each from a part
-    of the surface only.
-    """
-    frames = np.arange(len(nodes.images))
-    few, rest = frames[:START_FRAMES], frames[START_FRAMES:]
-    start, first = seen.frames(few), nodes.in_frames(few)
-    c, least = np.zeros((0, 0)), np.inf
-    for part in parts_of(nodes.reference):
-        inside = start.weighted(np.asarray(part[nodes.ends].all(axis=1), np.float64))
-        tried = convex_start(first, part, start, B, stiffness, camera)
-        tried = adjust_depths(inside, tried, stiffness, Solver(bend=FIRM_START * SOLVER.bend))
-        tried = adjust_depths(inside, tried, stiffness, SOLVER)
-        tried = tried if part.all() else once_more(start, start, tried, stiffness)[0]
-        g = start.log_lengths(tried)
-        change = usual(g - mean_log_lengths(start, g))
-        if not len(c) or change < least:
-            c, least = tried, change
-        by_edge = robust_lengths(start, g)[2]
-        if part.all() and (least < LITTLE_CHANGE or np.quantile(by_edge, 0.95) < TORN * np.median(by_edge)):
-            break
-    if not len(rest):
-        return c
-    logs = robust_lengths(start, start.log_lengths(c))[0]
-    alike = nearest(nodes.images[rest], nodes.images[few])
-    starts = [c[alike[:, k]] for k in range(min(OTHER_STARTS, len(c)))]
-    return np.concatenate([c, best_start(seen.frames(rest), logs, starts, stiffness, SOLVER.bend)])
-
-
-def again(
-    nodes: Nodes, seen: Edges, edges: Edges, c: Array, B: Array, stiffness: Array, camera: Camera
-) -> tuple[Array, Array]:
-    """As `once_more`, frames that fell into another minimum started from others that did not, too.
-
-    Raises:
-        ReconstructionError: there are no such depths.
-    """
-    off = robust_lengths(edges, edges.log_lengths(c))[1]
-    if not np.isfinite(off).all():
-        raise ReconstructionError("no depths along the rays keep the lengths")
-    good = np.flatnonzero(off <= np.median(off))
-    alike = good[nearest(nodes.images, nodes.images[good])]
-    starts = [np.tile(c[good].mean(axis=0), (len(c), 1))]
-    starts += [c[alike[:, k]] for k in range(min(OTHER_STARTS, len(good)))]
-    stuck = np.flatnonzero(off > np.median(off))
-    if len(stuck):
-        deepest, some = c.copy(), nodes.in_frames(stuck)
-        deepest[stuck] = convex_finish(some, edges.frames(stuck), nodes.in_frames(good), c[good], B, stiffness, camera)
-        starts.append(deepest)
-    return once_more(seen, edges, c, stiffness, starts)
-
-
-def once_more(seen: Edges, edges: Edges, c: Array, stiffness: Array, starts: Sequence[Array] = ()) -> tuple[Array, Array]:
-    """Adjust once more, each frame from the best of its own and other starts (F, r).
-
-    Returns:
-        coefficients (F, r); factors (n,) of the edges' weights: small for those that do not keep their length.
-    """
-    logs, _, change = robust_lengths(edges, edges.log_lengths(c))
-    factor = geman_mcclure(change / (DOUBTFUL * np.median(change) + 1e-12))
-    edges = seen.weighted(factor)
-    c = best_start(edges, logs, [c, *starts], stiffness, SOLVER.bend)
-    c[:, 0] -= c[:, 0].mean()
-    return adjust_depths(edges, c, stiffness, SOLVER), factor

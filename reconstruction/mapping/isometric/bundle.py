@@ -14,7 +14,7 @@ from reconstruction.arrays import Array
 from reconstruction.mapping.isometric.shape_prior import ShapePrior
 
 FUNCTIONS, FINE_FUNCTIONS = 60, 100
-GIVE = 0.002  # of lengths: what they change by, noise apart
+GIVE = 0.002  # of lengths of paper: what they change by, noise apart
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,14 @@ class Lengths:
         logs: (n,) logarithms of the lengths.
         weights: (n,) 1 for edges that keep their length, near 0 for those that do not.
         stiffness: (R,) bending energy of the functions.
+        give: standard deviation of the logs.
     """
 
     halves: Array
     logs: Array
     weights: Array
     stiffness: Array
+    give: float = GIVE
 
     def now(self, C: Array) -> tuple[Array, Array]:
         """Logarithms (F, n) of the lengths in shapes C (F, 3, R), and their slopes (2, F, 3, n) by the two half edges."""
@@ -73,7 +75,7 @@ def stepped(C: Array, data: Array, lengths: Lengths, prior: ShapePrior) -> Array
     """
     F, _, R = C.shape
     logs, slopes = lengths.now(C)
-    root = np.sqrt(lengths.weights) / GIVE
+    root = np.sqrt(lengths.weights) / lengths.give
     halves = [np.ascontiguousarray(half.T) for half in lengths.halves]
     held, away = prior.at(C)
     step = np.empty((F, 3 * R))

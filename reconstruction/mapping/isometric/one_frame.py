@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reconstruction.arrays import Array, Mask
-from reconstruction.mapping.isometric.convex import convex_finish
 from reconstruction.mapping.isometric.lengths import finish_depths
 from reconstruction.mapping.isometric.nodes import Nodes, nearest
 from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.isometric.starts import convex_finish
 from reconstruction.mapping.isometric.warps import quick_fit
 
 RENEWED = 0.3  # weight of the newest frame in the usual change of lengths

@@ -40,6 +40,7 @@ class IsometricSheet:
         bend: weight λ of bending that the depths were found with.
         shape_functions: R, of the functions of the images, that bundled shapes are made of.
         camera: the camera.
+        give: what lengths of bundled shapes are taken to change by, noise apart.
         by_focal: how far shapes may be off since the focal length was looked for, RMS over their size; 0 if it is given.
     """
 
@@ -55,6 +56,7 @@ class IsometricSheet:
     bend: float
     shape_functions: int
     camera: Camera
+    give: float = GIVE
     by_focal: float = 0.0
 
     @property
@@ -131,6 +133,7 @@ class IsometricSheet:
             self.log_lengths,
             self.edge_weights,
             self.warps.field.stiffness[: self.shape_functions],
+            self.give,
         )
 
     @cached_property
@@ -184,7 +187,7 @@ class IsometricSheet:
         total = float(self.edge_weights.sum())
         return np.asarray(
             np.where(weights > 0, weights * (off**2).sum(axis=1), 0.0).sum(axis=1)
-            + total * (self.length_change(C) / GIVE) ** 2
+            + total * (self.length_change(C) / self.give) ** 2
             + self.prior.cost(C)
         )
 

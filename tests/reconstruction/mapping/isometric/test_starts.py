@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from reconstruction.mapping.isometric.convex import maximum_depth
 from reconstruction.mapping.isometric.nodes import neighbours, rays_of
+from reconstruction.mapping.isometric.starts import maximum_depth
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 
 

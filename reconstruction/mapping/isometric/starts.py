@@ -1,22 +1,43 @@
-"""Depths that depend on no start: the deepest shapes of a few nodes, a convex problem, as smooth functions.
+"""Depths that depend on no start: the deepest shapes of a few nodes, a convex problem, as smooth functions, adjusted.
 
 Chhatkuli et al., CVPR 2016.
 """
+
+from collections.abc import Sequence
 
 import clarabel  # type: ignore[import-untyped]
 import numpy as np
 import scipy.sparse as sp
 
+from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
-from reconstruction.mapping.isometric.lengths import Edges
-from reconstruction.mapping.isometric.nodes import NEIGHBOURS, Nodes, neighbours, rays_of
+from reconstruction.mapping.isometric.lengths import (
+    Edges,
+    Solver,
+    adjust_depths,
+    best_start,
+    mean_log_lengths,
+    robust_lengths,
+    usual,
+)
+from reconstruction.mapping.isometric.nodes import NEIGHBOURS, Nodes, nearest, neighbours, rays_of
 from reconstruction.mapping.outliers import medians
+from reconstruction.window.robust import geman_mcclure
 
 CONVEX_NODES = 40
 PART_LEFT_OUT = 0.4  # of the points
 STIFFNESS = 1e-3
 SEEN = 0.3  # weight of an edge that can be relied on
+START_FRAMES = 10
+SOLVER = Solver()
+# Times its weights of bending and of long lengths, with which depths are held at first. The first is the best start of
+# paper; held so, cloth may get deeper and deeper.
+WAYS = ((100.0, 1.0), (10.0, 1.0), (100.0, 100.0), (1.0, 1.0))
+OTHER_STARTS = 2
+DOUBTFUL = 3.0  # times the usual change of length
+LITTLE_CHANGE = 0.006  # usual change of length, with which a start is good
+TORN = 2.5  # the worst edges' change over the usual one: strays spoil the start
 
 
 def convex_start(nodes: Nodes, part: Mask, edges: Edges, B: Array, stiffness: Array, camera: Camera) -> Array:
@@ -123,3 +144,81 @@ def maximum_depth(rays: Array, edges: Indices, seen: Mask, lengths: Array | None
     x[used] = clarabel.DefaultSolver(sp.csc_matrix((size, size)), goal[used], A[:, used], b, cones, settings).solve().x
     depth = x[: F * m].reshape(F, m) / unit
     return np.asarray(np.where(held, np.maximum(depth, 1e-6 * depth.max()), np.nan))
+
+
+def first_depths(nodes: Nodes, seen: Edges, B: Array, stiffness: Array, camera: Camera) -> Array:
+    """Coefficients (F, r): depths in the first frames, and the others with their lengths."""
+    frames = np.arange(len(nodes.images))
+    few, rest = frames[:START_FRAMES], frames[START_FRAMES:]
+    start = seen.frames(few)
+    c = depths_without_start(nodes.in_frames(few), start, B, stiffness, camera)
+    if not len(rest):
+        return c
+    logs = robust_lengths(start, start.log_lengths(c))[0]
+    alike = nearest(nodes.images[rest], nodes.images[few])
+    starts = [c[alike[:, k]] for k in range(min(OTHER_STARTS, len(c)))]
+    return np.concatenate([c, best_start(seen.frames(rest), logs, starts, stiffness, SOLVER.bend)])
+
+
+def depths_without_start(nodes: Nodes, edges: Edges, B: Array, stiffness: Array, camera: Camera) -> Array:
+    """Coefficients (F, r) of the deepest shapes, adjusted, held firm at first: in one of several ways.
+
+    Points of something else at a border spoil them: where lengths change much, other starts are tried, each from a part
+    of the surface only. What lengths change by counts, not their share: a sheet that is very deep in all frames alike has
+    very long ones, which hardly change by any share.
+    """
+    best, least = np.zeros((0, 0)), np.inf
+    for part in parts_of(nodes.reference):
+        inside = edges.weighted(np.asarray(part[nodes.ends].all(axis=1), np.float64))
+        deepest = convex_start(nodes, part, edges, B, stiffness, camera)
+        for bend, grow in WAYS if part.all() else WAYS[:1]:
+            firm = Solver(bend=bend * SOLVER.bend, grow=grow * SOLVER.grow)
+            c = adjust_depths(inside, adjust_depths(inside, deepest, stiffness, firm), stiffness, SOLVER)
+            c = c if part.all() else once_more(edges, edges, c, stiffness)[0]
+            g = edges.log_lengths(c)
+            share = usual(g - mean_log_lengths(edges, g))
+            if share * np.exp(g.mean()) < least:
+                best, least = c, share * np.exp(g.mean())
+            if share < LITTLE_CHANGE:
+                break
+        by_edge = robust_lengths(edges, edges.log_lengths(best))[2]
+        if part.all() and (share < LITTLE_CHANGE or np.quantile(by_edge, 0.95) < TORN * np.median(by_edge)):
+            break
+    return best
+
+
+def again(
+    nodes: Nodes, seen: Edges, edges: Edges, c: Array, B: Array, stiffness: Array, camera: Camera
+) -> tuple[Array, Array]:
+    """As `once_more`, frames that fell into another minimum started from others that did not, too.
+
+    Raises:
+        ReconstructionError: there are no such depths.
+    """
+    off = robust_lengths(edges, edges.log_lengths(c))[1]
+    if not np.isfinite(off).all():
+        raise ReconstructionError("no depths along the rays keep the lengths")
+    good = np.flatnonzero(off <= np.median(off))
+    alike = good[nearest(nodes.images, nodes.images[good])]
+    starts = [np.tile(c[good].mean(axis=0), (len(c), 1))]
+    starts += [c[alike[:, k]] for k in range(min(OTHER_STARTS, len(good)))]
+    stuck = np.flatnonzero(off > np.median(off))
+    if len(stuck):
+        deepest, some = c.copy(), nodes.in_frames(stuck)
+        deepest[stuck] = convex_finish(some, edges.frames(stuck), nodes.in_frames(good), c[good], B, stiffness, camera)
+        starts.append(deepest)
+    return once_more(seen, edges, c, stiffness, starts)
+
+
+def once_more(seen: Edges, edges: Edges, c: Array, stiffness: Array, starts: Sequence[Array] = ()) -> tuple[Array, Array]:
+    """Adjust once more, each frame from the best of its own and other starts (F, r).
+
+    Returns:
+        coefficients (F, r); factors (n,) of the edges' weights: small for those that do not keep their length.
+    """
+    logs, _, change = robust_lengths(edges, edges.log_lengths(c))
+    factor = geman_mcclure(change / (DOUBTFUL * np.median(change) + 1e-12))
+    edges = seen.weighted(factor)
+    c = best_start(edges, logs, [c, *starts], stiffness, SOLVER.bend)
+    c[:, 0] -= c[:, 0].mean()
+    return adjust_depths(edges, c, stiffness, SOLVER), factor
