@@ -157,7 +157,8 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
         way = GOING_ON * way if k >= ROUGH_ROUNDS else 0 * way
         way = way + np.median(found.lengths.now(C)[0], axis=0) - found.log_lengths
         found = replace(found, log_lengths=found.log_lengths + way)
-        found = replace(found, give=max(GIVE, float(np.median(found.length_change(C)))))
+        if not found.far:
+            found = replace(found, give=max(GIVE, float(np.median(found.length_change(C)))))
         before, shapes = shapes, C @ found.functions.T
         if np.sqrt(np.nanmean((shapes - before) ** 2)) < SETTLED * np.nanstd(before):
             break

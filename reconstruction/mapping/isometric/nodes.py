@@ -13,6 +13,7 @@ from reconstruction.mapping.isometric.warps import Warps
 NODES, NEIGHBOURS = 80, 6
 FINE_NODES, FINE_NEIGHBOURS = 120, 8
 USUAL_STRAIN = 0.01  # of lengths that are seen exactly
+FAR = 30.0  # focal length over the images' size, RMS, from which on perspective tells nothing
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,10 @@ class Nodes:
         i, j = self.ends.T
         longest = np.linalg.norm(self.images[:, :, i] - self.images[:, :, j], axis=1).max(axis=0)
         return np.asarray((self.variance[:, i] + self.variance[:, j]) / np.maximum(longest, 1e-12) ** 2)
+
+    def far(self, camera: Camera) -> bool:
+        """Whether they are too far away for perspective to tell a shape from its mirror image."""
+        return bool(camera.focal_px > FAR * np.median(np.sqrt(self.images.var(axis=2).sum(axis=1))))
 
     def in_frames(self, chosen: Indices) -> "Nodes":
         """The same in some of the keyframes."""

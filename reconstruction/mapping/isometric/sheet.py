@@ -19,7 +19,6 @@ from reconstruction.window.robust import geman_mcclure, lengths
 # Lengths of a sheet change by less between its bundled shapes, which hold no noise. By more, they really do (a balloon, a
 # crease), and then no rest shape is right, or bends are finer than its functions.
 USUAL_STRETCH = 0.0042
-FAR = 30.0  # focal length over the images' size, RMS, from which on perspective tells nothing
 FARTHEST = 1.5  # times as deep as before, or less deep: a step that goes further has lost its way, and is not taken
 
 
@@ -74,9 +73,8 @@ class IsometricSheet:
 
     @cached_property
     def far(self) -> bool:
-        """Whether it is too far away for perspective to tell a shape from its mirror image: no use in looking further."""
-        size = np.median(np.sqrt(self.nodes.images.var(axis=2).sum(axis=1)))
-        return bool(self.camera.focal_px > FAR * size)
+        """Whether perspective tells nothing: no use in looking further."""
+        return self.nodes.far(self.camera)
 
     @cached_property
     def stretch(self) -> float:

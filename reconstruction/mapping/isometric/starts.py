@@ -171,7 +171,7 @@ def depths_without_start(nodes: Nodes, edges: Edges, B: Array, stiffness: Array,
     for part in parts_of(nodes.reference):
         inside = edges.weighted(np.asarray(part[nodes.ends].all(axis=1), np.float64))
         deepest = convex_start(nodes, part, edges, B, stiffness, camera)
-        for bend, grow in WAYS if part.all() else WAYS[:1]:
+        for bend, grow in WAYS if part.all() and not nodes.far(camera) else WAYS[:1]:
             firm = Solver(bend=bend * SOLVER.bend, grow=grow * SOLVER.grow)
             c = adjust_depths(inside, adjust_depths(inside, deepest, stiffness, firm), stiffness, SOLVER)
             c = c if part.all() else once_more(edges, edges, c, stiffness)[0]
