@@ -91,6 +91,23 @@ def shaken(rng: np.random.Generator) -> Shape:
     return cloth.filmed(corners, hand, cloth.gusts(rng, (0.0, 0.0, 0.5), (0.5, 0.3, 0.8)))
 
 
+def drawn_together(corners: tuple[tuple[int, int], ...]) -> Maker:
+    """Cloths held by corners, drawn together by a tenth so that they sag between, each by a hand of its own."""
+
+    def maker(rng: np.random.Generator) -> Shape:
+        held = np.zeros((cloth.ROWS, cloth.COLUMNS), bool)
+        held[tuple(np.array(corners).T)] = True
+        inward = -0.1 * cloth.net()[:, held]
+        hands = [cloth.gusts(rng, (0.0, 0.0, 0.0), (0.05, 0.05, 0.12)) for _ in corners]
+        return cloth.filmed(
+            held,
+            lambda time: inward + np.column_stack([hand(time) for hand in hands]),
+            cloth.gusts(rng, (0.0, 0.0, 0.4), (0.3, 0.2, 0.5)),
+        )
+
+    return maker
+
+
 def rolling(rng: np.random.Generator) -> Shape:
     """Paper that is rolled up to most of a half cylinder and back; never flat."""
     along, a = rng.uniform(0, np.pi), rng.uniform(0, 2 * np.pi)
@@ -186,6 +203,8 @@ KINDS = {
     "curtain": Kind("sheet", swaying, (0.5, 1.0)),
     "cloth": Kind("sheet", shaken, SHEET_TURN),
     "flag": Kind("sheet", flapping, SHEET_TURN),
+    "towel": Kind("sheet", drawn_together(((0, 0), (0, -1))), SHEET_TURN),
+    "blanket": Kind("sheet", drawn_together(((0, 0), (0, -1), (-1, 0), (-1, -1))), SHEET_TURN),
     "cone": Kind("sheet", coning, SHEET_TURN, held_back=True),
     "crease": Kind("sheet", creasing, SHEET_TURN, held_back=True),
     "card": Kind("flat", still(flat), SOLID_TURN),

@@ -86,7 +86,7 @@ def simulated(held: Flags, hand: Vector, wind: Vector) -> Array:
 
     Args:
         held: (ROWS, COLUMNS) vertices that are where the hand has them.
-        hand: by how much (3,) it has moved.
+        hand: by how much (3,) it has moved; or (3, n), each of the n vertices held.
         wind: velocity (3,).
     """
     flat = net()
@@ -103,7 +103,7 @@ def simulated(held: Flags, hand: Vector, wind: Vector) -> Array:
         V += step * (GRAVITY[:, None, None] + DRAG * np.sign(across) * np.sqrt(np.abs(across)) * normal)
         before = X.copy()
         X += step * V
-        X[:, held] = flat[:, held] + hand(time)[:, None]
+        X[:, held] = flat[:, held] + hand(time).reshape(3, -1)
         for spring in springs:
             spring.pull()
         V = (X - before) / step

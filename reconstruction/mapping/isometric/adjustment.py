@@ -13,7 +13,7 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS as FINE_SHAPES
-from reconstruction.mapping.isometric.bundle import GIVE, places_moved
+from reconstruction.mapping.isometric.bundle import GIVE, MOST_GIVE, places_moved
 from reconstruction.mapping.isometric.lengths import (
     adjust_depths,
     finish_depths,
@@ -158,7 +158,7 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
         way = way + np.median(found.lengths.now(C)[0], axis=0) - found.log_lengths
         found = replace(found, log_lengths=found.log_lengths + way)
         if not found.far:
-            found = replace(found, give=max(GIVE, float(np.median(found.length_change(C)))))
+            found = replace(found, give=float(np.clip(np.median(found.length_change(C)), GIVE, MOST_GIVE)))
         before, shapes = shapes, C @ found.functions.T
         if np.sqrt(np.nanmean((shapes - before) ** 2)) < SETTLED * np.nanstd(before):
             break

@@ -14,7 +14,7 @@ from reconstruction.arrays import Array
 from reconstruction.mapping.isometric.shape_prior import ShapePrior
 
 FUNCTIONS, FINE_FUNCTIONS = 60, 100
-GIVE = 0.002  # of lengths of paper: what they change by, noise apart
+GIVE, MOST_GIVE = 0.002, 0.004  # what lengths of paper, and of cloth, change by, noise apart
 
 
 @dataclass(frozen=True)

@@ -38,3 +38,17 @@ def waving_sheet(
         shapes.append(shape + np.array([0.1 * np.sin(w), 0.1 * np.cos(w), 3.0])[:, None])
     S = np.array(shapes)
     return CAMERA.project(S) + noise_px * rng.standard_normal((frames, 2, points)), S
+
+
+def stretching_sheet(
+    rng: np.random.Generator, stretch: float, frames: int = 10, points: int = 120
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same of a sheet that bends little, does not turn, and is pulled about in its plane."""
+    uv, grid, shapes = rng.uniform(-1, 1, (2, points)) * [[0.6], [0.45]], np.linspace(-0.8, 0.8, 800), []
+    for _ in range(frames):
+        a, b, c = rng.uniform(0, 2 * np.pi, 3)
+        pulled = uv + stretch / 4 * np.stack([np.sin(3 * uv[1] + a) * np.cos(4 * uv[0] + b), np.sin(4 * uv[0] + c)])
+        slope = 0.2 * np.sin(5 * grid + rng.uniform(0, 2 * np.pi))
+        shapes.append(bent(pulled, rng.uniform(0, np.pi), slope, grid) + np.array([0.0, 0.0, 2.0])[:, None])
+    S = np.array(shapes)
+    return CAMERA.project(S) + 0.2 * rng.standard_normal((frames, 2, points)), S

@@ -11,10 +11,11 @@ from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.isometric.adjustment import bundled, in_halves, sheet
+from reconstruction.mapping.isometric.bundle import GIVE
 from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.one_frame import cheapest, shape_in
 from reconstruction.mapping.isometric.sheet import IsometricSheet
-from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
+from tests.reconstruction.mapping.bending import CAMERA, stretching_sheet, waving_sheet
 from tests.reconstruction.world import turns, views
 
 SEEN = np.ones((12, 150), bool)
@@ -108,7 +109,7 @@ def test_points_that_slip_together_count_by_the_shapes_not_by_smooth_images(monk
         w[:, near] += 6 * rng.standard_normal((2, 1))
     found = sheet(W, np.ones((20, 250), bool), CAMERA)
     by_shapes = error(bundled(found, W), S)
-    monkeypatch.setattr("reconstruction.mapping.isometric.sheet.FAR", 0.0)  # as if perspective told nothing
+    monkeypatch.setattr("reconstruction.mapping.isometric.nodes.FAR", 0.0)  # as if perspective told nothing
     assert by_shapes < 0.8 * error(bundled(found, W), S)
 
 
@@ -219,6 +220,14 @@ def test_what_stretches_is_no_sheet() -> None:
     W = W + 12 * np.sin(W[:, ::-1] / 20 + rng.uniform(0, 6, (15, 1, 1)))
     with pytest.raises(ReconstructionError, match="lengths change"):
         sheet(W, np.ones((15, 150), bool), CAMERA)
+
+
+def test_lengths_of_cloth_give_more_than_those_of_paper() -> None:
+    W, _, paper = waving()
+    assert bundled(paper, W).give == GIVE
+    W, _ = stretching_sheet(np.random.default_rng(1), stretch=0.03)
+    cloth = sheet(W, np.ones((len(W), W.shape[2]), bool), CAMERA)
+    assert bundled(cloth, W).give > 1.5 * GIVE
 
 
 def test_what_a_frame_hides_follows_shapes_of_keyframes() -> None:

@@ -1,10 +1,13 @@
-"""The convex start: no edge longer than its length, and nothing to say about points without edges."""
+"""Starts: no edge longer than its length, nothing to say about points without edges, no run to the depth."""
 
 import numpy as np
+import pytest
 
-from reconstruction.mapping.isometric.nodes import neighbours, rays_of
-from reconstruction.mapping.isometric.starts import maximum_depth
-from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
+from reconstruction.mapping.isometric.nodes import edges_between, neighbours, nodes_of, on_edges, rays_of
+from reconstruction.mapping.isometric.smooth_field import smooth_field
+from reconstruction.mapping.isometric.starts import depths_without_start, maximum_depth
+from reconstruction.mapping.isometric.warps import smooth_warps
+from tests.reconstruction.mapping.bending import CAMERA, stretching_sheet, waving_sheet
 
 
 def test_deepest_shapes_are_near_the_true_ones() -> None:
@@ -34,3 +37,21 @@ def test_with_lengths_known_the_deepest_shapes_keep_them() -> None:
     found = depth[:, None] * rays_of(W, CAMERA)
     assert (np.linalg.norm(found[:, :, i] - found[:, :, j], axis=1) < 1.01 * lengths).all()
     assert np.std(np.log(depth / S[:, 2])) < 0.05
+
+
+@pytest.mark.parametrize("seed", [4, 9])
+def test_what_stretches_is_not_made_deep_in_all_frames_alike(seed: int) -> None:
+    W, S = stretching_sheet(np.random.default_rng(seed), stretch=0.06)
+    warps = smooth_warps(W, np.ones((len(W), W.shape[2]), bool))
+    nodes = nodes_of(warps)
+    field = smooth_field(nodes.reference, 40)
+    B = warps.values_of(field)[nodes.points]
+    edges = edges_between(nodes, on_edges(nodes, field), CAMERA)
+    c = depths_without_start(nodes, edges, B, field.stiffness, CAMERA)
+    found = np.exp(c @ B.T)[:, None] * rays_of(nodes.images, CAMERA)
+
+    def deep(shapes: np.ndarray) -> float:
+        return float(np.median(np.ptp(shapes[:, 2], axis=1) / np.ptp(shapes[:, 0], axis=1)))
+
+    assert deep(S) < 0.1
+    assert deep(found) < 0.25  # held firm in one way only, 0.5
