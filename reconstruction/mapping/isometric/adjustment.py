@@ -14,10 +14,7 @@ from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS as FINE_SHAPES
 from reconstruction.mapping.isometric.bundle import GIVE, MOST_GIVE, places_moved
-from reconstruction.mapping.isometric.lengths import (
-    adjust_depths,
-    finish_depths,
-)
+from reconstruction.mapping.isometric.lengths import adjust_depths, finish_depths
 from reconstruction.mapping.isometric.nodes import edges_between, nodes_of, on_edges, rays_of
 from reconstruction.mapping.isometric.one_frame import mended
 from reconstruction.mapping.isometric.shape_prior import FIRM, ROUGH
@@ -157,7 +154,7 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
         way = GOING_ON * way if k >= ROUGH_ROUNDS else 0 * way
         way = way + np.median(found.lengths.now(C)[0], axis=0) - found.log_lengths
         found = replace(found, log_lengths=found.log_lengths + way)
-        if not found.far:
+        if not found.far:  # else lengths alone hold frames from turning to their mirror images
             found = replace(found, give=float(np.clip(np.median(found.length_change(C)), GIVE, MOST_GIVE)))
         before, shapes = shapes, C @ found.functions.T
         if np.sqrt(np.nanmean((shapes - before) ** 2)) < SETTLED * np.nanstd(before):

@@ -23,7 +23,7 @@ STARTS, STEPS = 6, 3  # keyframes that a frame in doubt starts from, and steps o
 ALIKE = 0.05  # of the depth's relief: shapes that differ by less are one
 MOST = 4  # different ones are bundled
 STEPS_USUALLY, STEPS_IN_DOUBT = 2, 8  # of bundling: after a few, a wrong shape may still cost less than the right one
-SETTLED = 0.999  # of its cost before: a shape that costs more after a step has come to its end
+SETTLED = 0.999  # of its cost before: a shape that costs no less after a step is not bundled any more
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def cheapest(sheet: IsometricSheet, shapes: Array, W: Array, weights: Array, ste
         seen = [np.broadcast_to(one, (len(shapes), *one.shape)) for one in (W, weights)]
         C = sheet.bundled(shapes, seen[0], seen[1], sheet.prior)
         before, costs = costs, sheet.cost(C, W, weights)
-        if not costs.min() >= least:  # at first
+        if least == np.inf or costs.min() < least:
             best, least = C[[costs.argmin()]], costs.min()
         going = costs < SETTLED * before
         if not going.any():
