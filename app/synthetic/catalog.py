@@ -13,6 +13,7 @@ from app.synthetic.path import Path
 
 Shape = Callable[[Array, float], Array]  # of places (n, 2) and a time from 0 to 1: points (n, 3)
 Maker = Callable[[np.random.Generator], Shape]
+UPPER_CORNERS = 0, [0, -1]  # of a cloth's mesh
 JAW, LID = 0.12, 0.28  # where the mouth is, down from the middle of a head; where a box's lid is hung
 HELD_SEEDS = 100  # seeds from this one on are held back
 
@@ -78,27 +79,24 @@ def swaying(rng: np.random.Generator) -> Shape:
 
 def flapping(rng: np.random.Generator) -> Shape:
     """A flag on a pole at its left, in a wind that turns."""
-    pole = np.zeros((cloth.ROWS, cloth.COLUMNS), bool)
-    pole[:, 0] = True
+    pole = cloth.held_at((slice(None), 0))
     return cloth.filmed(pole, lambda _: np.zeros(3), cloth.gusts(rng, (8.0, -1.0, 0.0), (1.5, 0.8, 1.2)))
 
 
 def shaken(rng: np.random.Generator) -> Shape:
     """A cloth held by its upper corners and shaken, in a draught."""
-    corners = np.zeros((cloth.ROWS, cloth.COLUMNS), bool)
-    corners[0, [0, -1]] = True
+    corners = cloth.held_at(UPPER_CORNERS)
     hand = cloth.gusts(rng, (0.0, 0.0, 0.0), (0.02, 0.02, 0.05))
     return cloth.filmed(corners, hand, cloth.gusts(rng, (0.0, 0.0, 0.5), (0.5, 0.3, 0.8)))
 
 
-def drawn_together(corners: tuple[tuple[int, int], ...]) -> Maker:
-    """Cloths held by corners, drawn together by a tenth so that they sag between, each by a hand of its own."""
+def drawn_together(corners: cloth.Places) -> Maker:
+    """Cloths held at their corners, drawn together by a tenth so that they sag between, each by a hand of its own."""
 
     def maker(rng: np.random.Generator) -> Shape:
-        held = np.zeros((cloth.ROWS, cloth.COLUMNS), bool)
-        held[tuple(np.array(corners).T)] = True
+        held = cloth.held_at(corners)
         inward = -0.1 * cloth.net()[:, held]
-        hands = [cloth.gusts(rng, (0.0, 0.0, 0.0), (0.05, 0.05, 0.12)) for _ in corners]
+        hands = [cloth.gusts(rng, (0.0, 0.0, 0.0), (0.05, 0.05, 0.12)) for _ in range(held.sum())]
         return cloth.filmed(
             held,
             lambda time: inward + np.column_stack([hand(time) for hand in hands]),
@@ -203,8 +201,8 @@ KINDS = {
     "curtain": Kind("sheet", swaying, (0.5, 1.0)),
     "cloth": Kind("sheet", shaken, SHEET_TURN),
     "flag": Kind("sheet", flapping, SHEET_TURN),
-    "towel": Kind("sheet", drawn_together(((0, 0), (0, -1))), SHEET_TURN),
-    "blanket": Kind("sheet", drawn_together(((0, 0), (0, -1), (-1, 0), (-1, -1))), SHEET_TURN),
+    "towel": Kind("sheet", drawn_together(UPPER_CORNERS), SHEET_TURN),
+    "blanket": Kind("sheet", drawn_together(np.ix_([0, -1], [0, -1])), SHEET_TURN),
     "cone": Kind("sheet", coning, SHEET_TURN, held_back=True),
     "crease": Kind("sheet", creasing, SHEET_TURN, held_back=True),
     "card": Kind("flat", still(flat), SOLID_TURN),

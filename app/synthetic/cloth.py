@@ -5,6 +5,7 @@ The unit of length is the cloth's width, that of time a second; x goes right, y 
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -24,6 +25,7 @@ BENDING, SHEAR = 0.1, 0.5  # share of what a step would have to undo that it doe
 NEIGHBOURS = ((0, 1, 1.0), (1, 0, 1.0), (1, 1, SHEAR), (1, -1, SHEAR), (0, 2, BENDING), (2, 0, BENDING))
 
 Vector = Callable[[float], Array]  # of a time in s
+Places = tuple[Any, ...]  # rows and columns of the mesh, as NumPy takes them
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,13 @@ def net() -> Array:
     """Vertices (3, ROWS, COLUMNS) of the flat cloth."""
     x, y = grid(COLUMNS, ROWS).T.reshape(2, ROWS, COLUMNS)
     return np.stack([x, y, np.zeros_like(x)])
+
+
+def held_at(places: Places) -> Flags:
+    """Which vertices (ROWS, COLUMNS) are at some rows and columns of the mesh."""
+    held = np.zeros((ROWS, COLUMNS), np.bool_)
+    held[places] = True
+    return held
 
 
 def gusts(rng: np.random.Generator, mean: tuple[float, float, float], sway: tuple[float, float, float]) -> Vector:

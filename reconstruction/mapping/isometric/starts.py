@@ -177,8 +177,9 @@ def depths_without_start(nodes: Nodes, edges: Edges, B: Array, stiffness: Array,
             c = c if part.all() else once_more(edges, edges, c, stiffness)[0]
             g = edges.log_lengths(c)
             share = usual(g - mean_log_lengths(edges, g))
-            if share * np.exp(g.mean()) < least:
-                best, least = c, share * np.exp(g.mean())
+            change = float(share * np.exp(g.mean()))
+            if change < least:
+                best, least = c, change
             if share < LITTLE_CHANGE:
                 break
         by_edge = robust_lengths(edges, edges.log_lengths(best))[2]
