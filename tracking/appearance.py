@@ -11,7 +11,7 @@ from tracking import Array, Flags, Floats, Indices
 
 MAX_STEP = 2.0  # patch pixels; beyond, the linear model of the patch does not hold
 CONVERGED = 0.05  # patch pixels; a shorter step ends the search
-FLAT = 1e-3  # grey levels of contrast below which a patch has no appearance
+FLAT = 1.0  # grey levels, norm of a patch: below, it has no appearance (rounding leaves 1e-3)
 # Light, deformation and compression spoil neighbouring pixels together: so many count as one. Measured against the truth as
 # squared errors over those of independent pixels: 38 and 19 (kinect_paper's picture and its half), 16 to 40 (made-up faces,
 # hardly any texture, down to the quarter of the picture).
@@ -79,7 +79,10 @@ class Fusion:
 
 
 class Appearance:
-    """Square patches around the points of one frame, compared regardless of gain and offset.
+    """Square patches around the points of one frame, compared regardless of gain, offset and slope of the light.
+
+    What bends or turns is lit otherwise on one side than on the other, and highlights stay where they are while texture
+    moves on: to first order, a slope over the patch.
 
     A patch is found again by inverse-compositional alignment (Baker & Matthews 2004, translation only): its
     gradients and normal matrices are computed once, an iteration samples the new picture and multiplies.
@@ -94,19 +97,20 @@ class Appearance:
         steps = np.arange(-radius, radius + 1, dtype=np.float32)
         u, v = np.meshgrid(steps, steps)
         self._grid = np.stack([u.ravel(), v.ravel(), np.ones(u.size, np.float32)])
+        self._slopes = (self._grid / np.linalg.norm(self._grid, axis=1, keepdims=True)).T  # orthonormal
         upright = np.broadcast_to(np.eye(2), (len(points_px), 2, 2))
         patches = _sample(image, points_px, upright, self._grid)
-        contrast = _centre(patches)
+        contrast = self._even(patches)
         patches /= contrast
         gradients = [
             (_sample(image, points_px + step, upright, self._grid) - _sample(image, points_px - step, upright, self._grid))
             / (2.0 * contrast)
             for step in np.eye(2)
         ]
-        # The part of the gradients that gain and offset cannot explain.
-        gradients = [g - g.mean(axis=1, keepdims=True) for g in gradients]
-        gradients = [g - _dot(g, patches)[:, None] * patches for g in gradients]
-        # All are free of offset, and the gradients of the patch: one product with what is seen gives score and slope.
+        for gradient in gradients:  # the part that the light and gain cannot explain
+            self._even(gradient)
+            gradient -= _dot(gradient, patches)[:, None] * patches
+        # All are free of the light, and the gradients of the patch: one product with what is seen gives score and slope.
         self._templates = np.stack([patches, *gradients], axis=1)
         normal = (self._templates[:, 1:] @ np.swapaxes(self._templates[:, 1:], 1, 2)).astype(np.float64)
         normal[:, (0, 1), (0, 1)] += 1e-3 * np.trace(normal, axis1=1, axis2=2)[:, None] + 1e-9
@@ -140,10 +144,15 @@ class Appearance:
     def _compare(self, image: Floats, points: Array, affine: Array, which: Indices) -> tuple[Array, Array]:
         """Score (n,) and half its falling slope (n, 2) where the picture is sampled for the points `which`."""
         seen = _sample(image, points, affine, self._grid)
-        contrast = _centre(seen)
+        contrast = self._even(seen)
         templates = self._templates if len(which) == len(self._templates) else self._templates[which]
         products = ((templates @ seen[:, :, None])[:, :, 0] / contrast).astype(np.float64)
         return products[:, 0], products[:, 1:]
+
+    def _even(self, patches: Floats) -> Floats:
+        """Take offset and slope of the light from patches (n, m), in place; their norms (n, 1)."""
+        patches -= (patches @ self._slopes) @ self._slopes.T
+        return np.maximum(np.sqrt(_dot(patches, patches)), FLAT)[:, None]
 
 
 def _sample(image: Floats, centres: Array, affine: Array, grid: Floats) -> Floats:
@@ -153,12 +162,6 @@ def _sample(image: Floats, centres: Array, affine: Array, grid: Floats) -> Float
     maps = np.concatenate([affine, centres[:, :, None]], axis=2).astype(np.float32)
     x, y = maps[:, 0] @ grid, maps[:, 1] @ grid
     return cast(Floats, cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
-
-
-def _centre(patches: Floats) -> Floats:
-    """Make the mean of each patch (n, m) zero, in place; their norms (n, 1)."""
-    patches -= (patches @ np.full(patches.shape[1], 1 / patches.shape[1], np.float32))[:, None]  # faster than a mean
-    return np.maximum(np.sqrt(_dot(patches, patches)), FLAT)[:, None]
 
 
 def _dot(a: Floats, b: Floats) -> Floats:

@@ -16,10 +16,10 @@ def picture(image: np.ndarray) -> np.ndarray:
     return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
 
 
-@pytest.mark.parametrize(("gain", "offset"), [(1.0, 0.0), (0.5, 60.0), (1.4, -50.0)])
-def test_finds_a_tilted_patch_whatever_the_light(gain: float, offset: float) -> None:
+@pytest.mark.parametrize(("gain", "offset", "slope"), [(1.0, 0.0, 0.0), (0.5, 60.0, 0.0), (1.4, -50.0, 0.0), (1.0, 0.0, 6.0)])
+def test_finds_a_tilted_patch_whatever_the_light(gain: float, offset: float, slope: float) -> None:
     forward, backward = tilt(1.0)
-    now = gain * picture(moved(IMAGE, backward)) + offset
+    now = gain * picture(moved(IMAGE, backward)) + offset + slope * np.arange(SIZE[0], dtype=np.float32)
     truth = forward(POINTS)
     affine = np.stack([forward(POINTS + e) - truth for e in np.eye(2)], axis=2)
     guess = truth + np.random.default_rng(0).uniform(-1.5, 1.5, truth.shape)
