@@ -16,7 +16,7 @@ def picture(image: np.ndarray) -> np.ndarray:
     return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
 
 
-@pytest.mark.parametrize(("gain", "offset", "slope"), [(1.0, 0.0, 0.0), (0.5, 60.0, 0.0), (1.4, -50.0, 0.0), (1.0, 0.0, 6.0)])
+@pytest.mark.parametrize(("gain", "offset", "slope"), [(1, 0, 0), (0.5, 60, 0), (1.4, -50, 0), (1, 0, 6)])
 def test_finds_a_tilted_patch_whatever_the_light(gain: float, offset: float, slope: float) -> None:
     forward, backward = tilt(1.0)
     now = gain * picture(moved(IMAGE, backward)) + offset + slope * np.arange(SIZE[0], dtype=np.float32)
