@@ -98,23 +98,28 @@ class Appearance:
         u, v = np.meshgrid(steps, steps)
         self._grid = np.stack([u.ravel(), v.ravel(), np.ones(u.size, np.float32)])
         self._slopes = (self._grid / np.linalg.norm(self._grid, axis=1, keepdims=True)).T  # orthonormal
-        upright = np.broadcast_to(np.eye(2), (len(points_px), 2, 2))
-        patches = _sample(image, points_px, upright, self._grid)
+        self._templates = np.empty((len(points_px), 3, steps.size**2), np.float32)
+        self._inverse = np.empty((len(points_px), 2, 2))
+        self.learn(image, points_px, np.broadcast_to(np.eye(2), (len(points_px), 2, 2)), np.arange(len(points_px)))
+
+    def learn(self, image: Floats, points_px: Array, affine: Array, which: Indices) -> None:
+        """The points `which` look as they do in a picture from now on."""
+        patches = _sample(image, points_px, affine, self._grid)
         contrast = self._even(patches)
         patches /= contrast
         gradients = [
-            (_sample(image, points_px + step, upright, self._grid) - _sample(image, points_px - step, upright, self._grid))
+            (_sample(image, points_px + step, affine, self._grid) - _sample(image, points_px - step, affine, self._grid))
             / (2.0 * contrast)
-            for step in np.eye(2)
+            for step in np.moveaxis(affine, 2, 0)
         ]
         for gradient in gradients:  # the part that the light and gain cannot explain
             self._even(gradient)
             gradient -= _dot(gradient, patches)[:, None] * patches
         # All are free of the light, and the gradients of the patch: one product with what is seen gives score and slope.
-        self._templates = np.stack([patches, *gradients], axis=1)
-        normal = (self._templates[:, 1:] @ np.swapaxes(self._templates[:, 1:], 1, 2)).astype(np.float64)
+        templates = np.stack([patches, *gradients], axis=1)
+        normal = (templates[:, 1:] @ np.swapaxes(templates[:, 1:], 1, 2)).astype(np.float64)
         normal[:, (0, 1), (0, 1)] += 1e-3 * np.trace(normal, axis1=1, axis2=2)[:, None] + 1e-9
-        self._inverse = np.linalg.inv(normal)
+        self._templates[which], self._inverse[which] = templates, np.linalg.inv(normal)
 
     def align(self, image: Floats, points_px: Array, affine: Array, which: Indices, iterations: int) -> Alignment:
         """Move the points `which` to where the picture looks most like their patches.

@@ -20,6 +20,7 @@ CLEAR_SCORE = 0.7  # above in the fine picture, its drift is removed there
 BLURRED_SCORE = 0.55  # above in the half picture, it is removed there
 RETRIEVE_SCORE = 0.7  # above in one of them, a lost point is taken up again
 SURE_PX = 0.5  # a point that the fine picture places so well needs no other word
+USUAL_PX = 0.25  # how well it places such points
 TAILS = 4.0  # degrees of freedom of how far neighbours miss a point
 CORRECT_PX = 2.0  # of the picture it is seen in: larger "drift" is another place that looks alike
 RETRIEVE_PX = 8.0  # how far from where it is expected a lost point may be found
@@ -57,6 +58,8 @@ class PointTracker:
         self._surroundings = Surroundings(self._reference)
         pictures = _pictures(self._grays)
         self._levels = [Appearance(picture, self._reference / 2.0**k, PATCH_RADIUS) for k, picture in enumerate(pictures)]
+        self._recent = Appearance(pictures[0], self._reference, PATCH_RADIUS)  # as they were when last surely placed
+        self._sure = np.zeros(len(points_px), np.bool_)  # surely placed in the last picture
         self._points = self._reference.copy()
         self._affine = np.broadcast_to(np.eye(2), (len(points_px), 2, 2)).copy()
         self._given_up = np.zeros(len(points_px), np.bool_)
@@ -82,6 +85,7 @@ class PointTracker:
         points = self._refine(pictures, points, motion)
         points = self._retrieve(pictures, points, self._expected(points, motion, predicted_px), motion)
         points[self._given_up | ~_inside(points, pictures[0].shape)] = np.nan
+        self._sure &= np.isfinite(points[:, 0])
         self._grays, self._points, self._affine = grays, points, motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
 
@@ -94,6 +98,7 @@ class PointTracker:
         """
         self._grays = Grays.of(image_bgr)
         self._points = np.full_like(self._reference, np.nan)
+        self._sure[:] = False
         return self.regain(expected_px)
 
     def regain(self, expected_px: Array) -> Observation:
@@ -129,6 +134,7 @@ class PointTracker:
         clear = fine.score > CLEAR_SCORE
         sure = clear & (fine.sigma_px < SURE_PX)
         self._correct(points, seen[sure], fine.points_px[sure])
+        self._learn(seen[sure])
         left = np.flatnonzero(~sure)
         if len(left) == 0:
             return points
@@ -147,12 +153,26 @@ class PointTracker:
                 same = clear | (before > keep) | ((found.score_before > keep) & (before > 0.0))
             good = (found.score > least) & _near(found.points_px, start / scale)
             where.add(scale * found.points_px, scale**2 * found.covariance, good)
+        # Light and view change slowly: a point looks more like it did when last seen clearly than in the reference. It is
+        # never learnt from where it was found so: errors do not add up.
+        found = self._recent.align(pictures[0], start, affine, which, REFINE_STEPS)
+        like = found.score > CLEAR_SCORE
+        where.add(found.points_px, found.covariance + USUAL_PX**2 * np.eye(2), like & _near(found.points_px, start))
+        same |= like
         # What the surface does between its points has heavy tails, as Student's t has them.
         away = ((motion.fitted_px[which] - start) ** 2).sum(axis=1)
         usual = ((TAILS * motion.scale_px**2 + away) / (TAILS + 2.0))[:, None, None] * np.eye(2)
         where.add(motion.fitted_px[which], usual, motion.support[which] >= MIN_SUPPORT)
         points[which] = np.where(same[:, None], where.points_px, np.nan)
         return points
+
+    def _learn(self, sure: Indices) -> None:
+        """Take what points looked like in the last picture that were sure there, and are so no more; `sure` (n,) are."""
+        before, self._sure = self._sure, np.zeros(len(self._reference), np.bool_)
+        self._sure[sure] = True
+        new = np.flatnonzero(before & ~self._sure)
+        if len(new):
+            self._recent.learn(self._grays.full.astype(np.float32), self._points[new], self._affine[new], new)
 
     def _correct(self, points: Array, which: Indices, aligned: Array) -> None:
         """Move points in place to their aligned positions where these are near; NaN stays."""

@@ -55,6 +55,18 @@ def test_a_subset_keeps_its_own_patches() -> None:
     assert nothing.points_px.shape == (0, 2)
 
 
+def test_points_look_as_they_were_learnt() -> None:
+    forward, backward = tilt(1.0)
+    truth = forward(POINTS)
+    affine = np.stack([forward(POINTS + e) - truth for e in np.eye(2)], axis=2)
+    other = moved(texture(seed=9), backward)
+    appearance = Appearance(picture(IMAGE), POINTS, 7)
+    appearance.learn(picture(other), truth[::2], affine[::2], ALL[::2])
+    found = appearance.align(picture(other), truth + 0.7, affine, ALL, 4)
+    np.testing.assert_allclose(found.points_px[::2], truth[::2], atol=0.05)
+    assert np.median(found.score[1::2]) < 0.5
+
+
 def test_along_an_edge_a_place_is_unsure() -> None:
     image = np.full(SIZE[::-1], 100, np.float32)
     image[:, 160:] = 150
