@@ -153,10 +153,11 @@ class PointTracker:
                 same = clear | (before > keep) | ((found.score_before > keep) & (before > 0.0))
             good = (found.score > least) & _near(found.points_px, start / scale)
             where.add(scale * found.points_px, scale**2 * found.covariance, good)
-        # Light and view change slowly: a point looks more like it did when last seen clearly than in the reference. It is
-        # never learnt from where it was found so: errors do not add up.
+        # Light and view change slowly: what the reference is no longer like is more like it was when that was last sure of
+        # it. It is not learnt from where it was found so: errors do not add up. What is clear is left alone: the errors of
+        # compression are those of the pictures just before, too.
         found = self._recent.align(pictures[0], start, affine, which, REFINE_STEPS)
-        like = found.score > CLEAR_SCORE
+        like = ~clear & (found.score > CLEAR_SCORE)
         where.add(found.points_px, found.covariance + USUAL_PX**2 * np.eye(2), like & _near(found.points_px, start))
         same |= like
         # What the surface does between its points has heavy tails, as Student's t has them.
