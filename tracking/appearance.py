@@ -103,7 +103,14 @@ class Appearance:
         self.learn(image, points_px, np.broadcast_to(np.eye(2), (len(points_px), 2, 2)), np.arange(len(points_px)))
 
     def learn(self, image: Floats, points_px: Array, affine: Array, which: Indices) -> None:
-        """The points `which` look as they do in a picture from now on."""
+        """The points `which` look as they do in a picture from now on.
+
+        Args:
+            image: (H, W) float32 picture.
+            points_px: (n, 2) where they are in it.
+            affine: (n, 2, 2) maps from the patch to the picture.
+            which: (n,) the points' indices.
+        """
         patches = _sample(image, points_px, affine, self._grid)
         contrast = self._even(patches)
         patches /= contrast

@@ -68,6 +68,7 @@ class PointTracker:
         """Look for these points (P,) no more."""
         self._given_up |= points
         self._points[points] = np.nan
+        self._sure[points] = False
 
     def track(self, image_bgr: Image, predicted_px: Array | None = None) -> Observation:
         """Find the points in the next frame.
