@@ -65,11 +65,11 @@ class Fusion:
         self._known = np.zeros((len(points_px), 2, 2))
         self._sum = np.zeros((len(points_px), 2))
 
-    def add(self, points_px: Array, covariance: Array, good: Flags) -> None:
-        """Places (n, 2) px with covariance (n, 2, 2) px², where `good` (n,)."""
+    def add(self, points_px: Array, covariance: Array, good: Flags, which: Indices | slice = slice(None)) -> None:
+        """Places (m, 2) px of some points, `which` (m,), with covariance (m, 2, 2) px², where `good` (m,)."""
         known = np.where(good[:, None, None], np.linalg.inv(covariance), 0.0)
-        self._known += known
-        self._sum += (known @ (points_px - self._start)[:, :, None])[:, :, 0]
+        self._known[which] += known
+        self._sum[which] += (known @ (points_px - self._start[which])[:, :, None])[:, :, 0]
 
     @property
     def points_px(self) -> Array:

@@ -1,5 +1,6 @@
 """The point tracker: pyramidal Lucas-Kanade checked by appearance and neighbours, and re-acquisition."""
 
+from copy import deepcopy
 from dataclasses import dataclass
 
 import cv2
@@ -58,7 +59,7 @@ class PointTracker:
         self._surroundings = Surroundings(self._reference)
         pictures = _pictures(self._grays)
         self._levels = [Appearance(picture, self._reference / 2.0**k, PATCH_RADIUS) for k, picture in enumerate(pictures)]
-        self._recent = Appearance(pictures[0], self._reference, PATCH_RADIUS)  # as they were when last surely placed
+        self._recent = deepcopy(self._levels[0])  # as points were when last surely placed
         self._sure = np.zeros(len(points_px), np.bool_)  # surely placed in the last picture
         self._points = self._reference.copy()
         self._affine = np.broadcast_to(np.eye(2), (len(points_px), 2, 2)).copy()
@@ -68,7 +69,6 @@ class PointTracker:
         """Look for these points (P,) no more."""
         self._given_up |= points
         self._points[points] = np.nan
-        self._sure[points] = False
 
     def track(self, image_bgr: Image, predicted_px: Array | None = None) -> Observation:
         """Find the points in the next frame.
@@ -86,7 +86,6 @@ class PointTracker:
         points = self._refine(pictures, points, motion)
         points = self._retrieve(pictures, points, self._expected(points, motion, predicted_px), motion)
         points[self._given_up | ~_inside(points, pictures[0].shape)] = np.nan
-        self._sure &= np.isfinite(points[:, 0])
         self._grays, self._points, self._affine = grays, points, motion.affine
         return Observation(points.copy(), np.isfinite(points[:, 0]))
 
@@ -157,10 +156,12 @@ class PointTracker:
         # Light and view change slowly: what the reference is no longer like is more like it was when that was last sure of
         # it. It is not learnt from where it was found so: errors do not add up. What is clear is left alone: the errors of
         # compression are those of the pictures just before, too.
-        found = self._recent.align(pictures[0], start, affine, which, REFINE_STEPS)
-        like = ~clear & (found.score > CLEAR_SCORE)
-        where.add(found.points_px, found.covariance + USUAL_PX**2 * np.eye(2), like & _near(found.points_px, start))
-        same |= like
+        unlike = np.flatnonzero(~clear)
+        found = self._recent.align(pictures[0], start[unlike], affine[unlike], which[unlike], REFINE_STEPS)
+        like = found.score > CLEAR_SCORE
+        same[unlike] |= like
+        good = like & _near(found.points_px, start[unlike])
+        where.add(found.points_px, found.covariance + USUAL_PX**2 * np.eye(2), good, unlike)
         # What the surface does between its points has heavy tails, as Student's t has them.
         away = ((motion.fitted_px[which] - start) ** 2).sum(axis=1)
         usual = ((TAILS * motion.scale_px**2 + away) / (TAILS + 2.0))[:, None, None] * np.eye(2)
@@ -170,7 +171,8 @@ class PointTracker:
 
     def _learn(self, sure: Indices) -> None:
         """Take what points looked like in the last picture that were sure there, and are so no more; `sure` (n,) are."""
-        before, self._sure = self._sure, np.zeros(len(self._reference), np.bool_)
+        before = self._sure & np.isfinite(self._points[:, 0])
+        self._sure = np.zeros(len(before), np.bool_)
         self._sure[sure] = True
         new = np.flatnonzero(before & ~self._sure)
         if len(new):
