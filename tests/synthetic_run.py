@@ -15,7 +15,7 @@ from reconstruction.basis.modal_basis import ModalBasis
 from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
 from reconstruction.estimate import ShapeEstimate
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame
 
 SIZE = (160, 120)

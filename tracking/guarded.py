@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 
 from tracking import Array, Flags, Image
-from tracking.klt import Observation, PointTracker
+from tracking.klt import PointTracker
+from tracking.observation import Observation
 from tracking.region.left_behind import LeftBehind
 from tracking.relocalisation import Relocalisation
 

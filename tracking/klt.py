@@ -1,7 +1,6 @@
 """The point tracker: pyramidal Lucas-Kanade checked by appearance and neighbours, and re-acquisition."""
 
 from copy import deepcopy
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -10,6 +9,7 @@ from tracking import Array, Flags, Floats, Image, Indices
 from tracking.appearance import Appearance, Fusion
 from tracking.consistency import MIN_SUPPORT, LocalMotion, Surroundings
 from tracking.flow import Flow, Grays
+from tracking.observation import Observation
 
 PATCH_RADIUS = 7
 BORDER_PX = 4.0  # nearer to the border a point counts as having left
@@ -29,19 +29,6 @@ REFINE_STEPS = 2
 RETRIEVE_STEPS = 3
 RESUME_ROUNDS = 3  # of looking for points of which only rough places are known
 PREDICTION_WEIGHT = 0.2  # of a predicted neighbour against a seen one
-
-
-@dataclass(frozen=True)
-class Observation:
-    """What one frame shows of the points.
-
-    Attributes:
-        points_px: (P, 2) image points W^f, NaN where not visible.
-        visible: (P,) h^f.
-    """
-
-    points_px: Array
-    visible: Flags
 
 
 class PointTracker:
@@ -64,6 +51,8 @@ class PointTracker:
         self._points = self._reference.copy()
         self._affine = np.broadcast_to(np.eye(2), (len(points_px), 2, 2)).copy()
         self._given_up = np.zeros(len(points_px), np.bool_)
+        self._unlike = np.zeros(len(points_px), np.bool_)
+        self._counts = np.zeros(2, np.int64)  # of points seen so far, and of those that were alike
 
     def give_up(self, points: Flags) -> None:
         """Look for these points (P,) no more."""
@@ -85,9 +74,8 @@ class PointTracker:
         points[~motion.consistent] = np.nan
         points = self._refine(pictures, points, motion)
         points = self._retrieve(pictures, points, self._expected(points, motion, predicted_px), motion)
-        points[self._given_up | ~_inside(points, pictures[0].shape)] = np.nan
-        self._grays, self._points, self._affine = grays, points, motion.affine
-        return Observation(points.copy(), np.isfinite(points[:, 0]))
+        self._grays = grays
+        return self._observation(points, motion)
 
     def resume(self, image_bgr: Image, expected_px: Array) -> Observation:
         """Find the points in a frame from their rough places alone, and go on from there.
@@ -98,7 +86,7 @@ class PointTracker:
         """
         self._grays = Grays.of(image_bgr)
         self._points = np.full_like(self._reference, np.nan)
-        self._sure[:] = False
+        self._sure[:] = self._unlike[:] = False
         return self.regain(expected_px)
 
     def regain(self, expected_px: Array) -> Observation:
@@ -114,9 +102,15 @@ class PointTracker:
             motion = self._motion(sought, None)
             expected = np.where(np.isfinite(points), np.nan, sought)
             points = self._retrieve(pictures, points, expected, motion)
-        points[self._given_up | ~_inside(points, pictures[0].shape)] = np.nan
+        return self._observation(points, motion)
+
+    def _observation(self, points: Array, motion: LocalMotion) -> Observation:
+        """What is seen in the picture there is now, and is where the next begins."""
+        points[self._given_up | ~_inside(points, self._grays.full.shape)] = np.nan
         self._points, self._affine = points, motion.affine
-        return Observation(points.copy(), np.isfinite(points[:, 0]))
+        visible = np.isfinite(points[:, 0])
+        self._counts += visible.sum(), (visible & ~self._unlike).sum()
+        return Observation(points.copy(), visible, float(self._counts[1] / max(self._counts[0], 1)))
 
     def _motion(self, points: Array, predicted_px: Array | None) -> LocalMotion:
         weight = np.isfinite(points[:, 0]).astype(np.float64)
@@ -135,6 +129,8 @@ class PointTracker:
         sure = clear & (fine.sigma_px < SURE_PX)
         self._correct(points, seen[sure], fine.points_px[sure])
         self._learn(seen[sure])
+        self._unlike[:] = False
+        self._unlike[seen[~clear]] = True
         left = np.flatnonzero(~sure)
         if len(left) == 0:
             return points

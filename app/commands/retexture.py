@@ -26,7 +26,7 @@ from app.terminal.exit_code import ExitCode
 from app.terminal.interrupts import completed
 from app.terminal.progress import Progress
 from app.terminal.summary import Summary
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame, Video
 
 RRD_MAGIC = b"RRF"

@@ -9,7 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from app.arrays import Array
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.tracks import Tracks
 
 AHEAD = 30  # frames that are told at a time

@@ -15,7 +15,7 @@ from app.painting.picture import Texture
 from app.painting.placement import Placement
 from reconstruction.basis.model import Model
 from reconstruction.estimate import ShapeEstimate
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame
 
 

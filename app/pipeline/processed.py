@@ -8,7 +8,7 @@ from app.arrays import Array, Image
 from reconstruction.basis.model import Model
 from reconstruction.estimate import ShapeEstimate
 from reconstruction.settings import Metric
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame
 
 MOST_BYTES = 400 * 2**20  # of pictures that wait for shapes

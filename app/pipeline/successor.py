@@ -15,7 +15,7 @@ from reconstruction import ReconstructionError
 from reconstruction.mapping.start import Start
 from reconstruction.online import Phase
 from tracking import TrackingError
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame
 
 # Seconds of the source in which only the lost object is looked for. After a cut it may come back with the next one, or when

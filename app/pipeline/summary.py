@@ -171,7 +171,7 @@ def summary_of(
 ) -> RunSummary:
     """The summary of a run and of one of its objects."""
     reconstruction, collected = tracked.reconstruction, tracked.collected
-    word = verdict(collected.course, reconstruction.map, few_bits(tracked.config.source))
+    word = verdict(collected.course, reconstruction.map, few_bits(tracked.config.source), tracked.alike)
     rest, camera = reconstruction.rest, reconstruction.camera
     online = tracked.score(tracked.online)
     several = len(recordings) > 1

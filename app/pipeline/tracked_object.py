@@ -20,7 +20,7 @@ from reconstruction.estimate import ShapeEstimate
 from reconstruction.mapping.start import Start
 from reconstruction.online import Phase
 from tracking.guarded import Change, Guarded
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.tracks import Truth
 from tracking.video import Frame
 
@@ -39,7 +39,7 @@ class TrackedObject:
 
     Attributes:
         config, number, first, points_px: the same.
-        lost: whether it is lost.
+        lost, alike: whether it is lost; share of its points seen so far that looked as in its first frame.
         since, last: frames of the source from which on it has been followed, and that showed it last.
         recordings: the files that it is recorded in.
         reconstruction: its estimator.
@@ -70,7 +70,7 @@ class TrackedObject:
             self._texture = first_picture(config.texture)
         height, width = first.image.shape[:2]
         self.reconstruction = estimator(config, (width, height), points_px, start, frames)
-        self.lost = False
+        self.lost, self.alike = False, 1.0
         self.since = self.last = first.index
         self.recordings: list[Path] = []
         self._astray = np.zeros(len(points_px), np.bool_)
@@ -135,6 +135,8 @@ class TrackedObject:
             self._astray |= seen.astray
         if seen.change is not Change.NONE:
             self.lost = seen.change is Change.LOST
+        if not self.lost:
+            self.alike = seen.observation.alike
         if seen.change is Change.RECOVERED:  # nothing ties it to where it was
             self.reconstruction.restart()
         return seen
@@ -220,12 +222,10 @@ class TrackedObject:
             both.callback(self._save_tracks)
 
     def _save_tracks(self) -> None:
-        path = self.config.output.tracks_out
-        if not path or self._stored is None:
-            return
-        camera = self.reconstruction.camera
-        with writable(path) as file:
-            self._stored.save(file, camera.K if camera.perspective else None)
+        path, stored, camera = self.config.output.tracks_out, self._stored, self.reconstruction.camera
+        if path and stored is not None:
+            with writable(path) as file:
+                stored.save(file, camera.K if camera.perspective else None)
 
     def _save_shapes(self) -> None:
         path, collected = self.config.output.shapes_out, self.collected

@@ -31,7 +31,7 @@ from reconstruction.basis.modal_basis import ModalBasis
 from reconstruction.basis.model import Model
 from reconstruction.camera import Camera
 from reconstruction.estimate import ShapeEstimate
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame
 
 NOWHERE = np.empty((0, 2))

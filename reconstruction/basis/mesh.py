@@ -12,7 +12,9 @@ from reconstruction.arrays import Array, Indices, Mask
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-SLIVER_DEGREES = 10.0  # triangles on the border with a smaller angle bridge a dent of the outline: nothing is seen there
+# Triangles on the border bridge a dent of the outline, where nothing is seen, if they have
+SLIVER_DEGREES = 10.0  # a smaller angle, or
+LONG_SIDE = 4.0  # a side so many times as long as half of those at either end are at most, and half of all
 CHANCE = 3.0  # standard deviations of a count that come about by chance
 
 
@@ -69,23 +71,36 @@ def triangulate(points: Array) -> Mesh:
     except QhullError as error:
         raise ReconstructionError("cannot make a mesh: the points lie on one line, or move at random") from error
     faces = triangulation.simplices.astype(np.int64)
-    return mesh_from_faces(without_slivers(points, faces))
+    return mesh_from_faces(without_bridges(points, faces))
 
 
-def without_slivers(points: Array, faces: Indices) -> Indices:
-    """Triangles (m, 3) over points (p, 2), those on the border peeled off as long as they are slivers; no point is lost."""
-    side = np.unique(sides(faces), axis=0, return_inverse=True)[1].reshape(-1, 3)
-    thin = np.flatnonzero(smallest_angle(points, faces) < np.deg2rad(SLIVER_DEGREES))
+def without_bridges(points: Array, faces: Indices) -> Indices:
+    """Triangles (m, 3) over points (p, 2), bridges on the border peeled off, one after the other; no point is lost."""
+    edges, side = np.unique(sides(faces), axis=0, return_inverse=True)
+    side = side.reshape(-1, 3)
+    bridges = long_sides(points, edges)[side].any(axis=1)
+    bridges |= smallest_angle(points, faces) < np.deg2rad(SLIVER_DEGREES)
+    left = np.flatnonzero(bridges)
     kept = np.ones(len(faces), np.bool_)
     while True:
         users, sharers = np.bincount(faces[kept].ravel(), minlength=len(points)), np.bincount(side[kept].ravel())
-        thin = thin[kept[thin]]
-        out = thin[(sharers[side[thin]] == 1).any(axis=1) & (users[faces[thin]] > 1).all(axis=1)]
+        left = left[kept[left]]
+        out = left[(sharers[side[left]] == 1).any(axis=1) & (users[faces[left]] > 1).all(axis=1)]
         if not len(out):
             return faces[kept]
         first = np.full(len(points), len(faces))
         np.minimum.at(first, faces[out], out[:, None])  # one at a time around each point: its last one stays
         kept[out[(first[faces[out]] == out[:, None]).all(axis=1)]] = False
+
+
+def long_sides(points: Array, edges: Indices) -> Mask:
+    """Which edges (n, 2) of points (p, 2) are much longer than those around."""
+    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    ends, both = edges.ravel(), np.repeat(length, 2)
+    count = np.bincount(ends, minlength=len(points))
+    half = np.cumsum(count) - count + (count.clip(1) - 1) // 2  # of each point's edges, shortest first
+    usual = both[np.lexsort((both, ends))][half.clip(None, len(both) - 1)]
+    return np.asarray(length > LONG_SIDE * usual[edges].max(axis=1).clip(np.median(length)))
 
 
 def boundary(faces: Indices) -> Indices:

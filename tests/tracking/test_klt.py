@@ -6,7 +6,8 @@ import pytest
 
 from tests.tracking.scene import SIZE, moved, texture, tilt
 from tracking.features import detect_corners
-from tracking.klt import Observation, PointTracker
+from tracking.klt import PointTracker
+from tracking.observation import Observation
 from tracking.region.mask import region_mask
 from tracking.tracks import Truth
 from tracking.video import Video
@@ -41,6 +42,7 @@ def test_follows_a_surface_that_turns_and_tilts() -> None:
     assert seen.visible.mean() > 0.95
     assert np.median(errors(seen, truth)) < 0.1
     assert np.percentile(errors(seen, truth), 98) < 0.5
+    assert seen.alike > 0.98
 
 
 def test_what_comes_to_look_otherwise_is_followed() -> None:
@@ -53,6 +55,7 @@ def test_what_comes_to_look_otherwise_is_followed() -> None:
     error = errors(seen, forward(POINTS))
     assert seen.visible.mean() > 0.78  # 0.72 by the reference alone
     assert np.percentile(error, 90) < 1.0
+    assert seen.alike < 0.8
 
 
 def test_points_on_a_contour_do_not_slide_along_it() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tracking import Array, Flags
-from tracking.klt import Observation
+from tracking.observation import Observation
 
 STAYS_PX = 2.0  # from where it began a point that stays is not farther
 TORN_PX = 10.0  # the usual way of the moving points beside it: between them and it the motion is torn, no surface bends so

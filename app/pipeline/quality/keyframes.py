@@ -25,7 +25,7 @@ FAR_TURNED = 90.0  # degrees: views of a solid that turns farther share few poin
 WITH_TURN = 0.7  # share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
-BY_FOCAL = 0.02  # of its size, that shapes may be off by a focal length that was looked for
+FAIR_BY_FOCAL, POOR_BY_FOCAL = 0.02, 0.05  # of its size, that shapes may be off by a focal length that was looked for
 SURELY = 2.4  # sureness of a sheet that nothing turns: cloth that stretches has up to 2.1, rolled paper 2.7 and more
 MOSTLY = 2.4  # times what a solid leaves over a plane must: rigid ones, turned by 8°, have 2.9 and more, limbs up to 1.5
 RECOVERED = ("rigid", "plane")  # by the first frames
@@ -147,9 +147,10 @@ def of_sheet(found: IsometricSheet, evidence: Evidence, *, perspective: bool) ->
         told = f"its lengths differ by {evidence.length_change:.0%} from half to half of the keyframes"
         told += ": it may be no sheet, or it is lost in noise"
         yield Verdict("poor", f"{told}; draw the region tightly, film it sharper")
-    if found.by_focal > BY_FOCAL:
+    if found.by_focal > FAIR_BY_FOCAL:
         told = f"its focal length is hardly known, which may put shapes off by {found.by_focal:.1%}"
-        yield Verdict("fair", f"{told}; give it by --focal, or film it bending more, from near by")
+        worse: Grade = "poor" if found.by_focal > POOR_BY_FOCAL else "fair"
+        yield Verdict(worse, f"{told}; give it by --focal, or film it bending more, from near by")
     if found.stretch > USUAL_STRETCH:
         why = f"its lengths change by {found.stretch:.1%}: it stretches, has creases, or fine folds"
         yield Verdict("fair", f"{why}; if it is a solid: --rest-shape solid")

@@ -7,22 +7,23 @@ import numpy as np
 
 from app.pipeline.quality.course import Course
 from app.pipeline.quality.finding import GRADES, Grade, Verdict
-from app.pipeline.quality.frames import errors, seen
+from app.pipeline.quality.frames import errors, looks, seen
 from app.pipeline.quality.keyframes import BY_KEYFRAMES, evidence
 from reconstruction.mapping.map import Map
 
 
-def verdict(course: Course, found: Map | None, bits_per_px: float | None = None) -> Verdict:
+def verdict(course: Course, found: Map | None, bits_per_px: float | None = None, alike: float = 1.0) -> Verdict:
     """The verdict on shapes of frames.
 
     Args:
         course: what each frame tells.
         found: what the object is taken for; None if there is no model.
         bits_per_px: what the video's encoder spent, if that is so little that what is seen may not be what was there.
+        alike: share of the points seen that looked as in the first frame.
     """
     if found is None or np.isnan(np.asarray(course.errors)).all():
         return Verdict("poor", "there is no shape; the video is too short, or the surface has too little texture")
-    findings = [*errors(course, found), *seen(course)]
+    findings = [*errors(course, found), *seen(course), *looks(alike)]
     if bits_per_px is not None:
         told = f"compressed to {bits_per_px:.2g} bits a pixel, texture is made up between key pictures; export it with more"
         findings.append(Verdict("poor", told))

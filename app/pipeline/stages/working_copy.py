@@ -9,7 +9,6 @@ import numpy as np
 from app.arrays import Array, Image
 from app.pipeline.stages.messages import Footage
 from tracking.guarded import Guarded
-from tracking.klt import Observation
 from tracking.region.search import Found
 from tracking.region.surface import Surface
 from tracking.video import Frame
@@ -68,7 +67,7 @@ class WorkingCopy:
     def guarded(self, seen: Guarded) -> Guarded:
         """What the copy shows, in the picture's pixels."""
         observation = seen.observation
-        return replace(seen, observation=Observation(self.in_picture(observation.points_px), observation.visible))
+        return replace(seen, observation=replace(observation, points_px=self.in_picture(observation.points_px)))
 
     def found(self, found: Found) -> Found:
         """What was found in the copy, in the picture's pixels."""

@@ -3,7 +3,7 @@
 import numpy as np
 
 from app.files.stored_tracks import AHEAD, StoredFrame, StoredTracks
-from tracking.klt import Observation
+from tracking.observation import Observation
 
 
 def test_frames_come_back_as_they_were() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from app.pipeline.processed import InOrder
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame
 
 

@@ -177,6 +177,13 @@ def test_what_is_not_seen_is_a_guess(share: float, grade: str) -> None:
     assert verdict(course([0.003] * 50, share), SOLID).grade == grade
 
 
+@pytest.mark.parametrize(("alike", "grade"), [(0.84, "good"), (0.73, "fair"), (0.5, "poor")])
+def test_what_looks_otherwise_than_it_did_may_have_slid(alike: float, grade: str) -> None:
+    said = verdict(course([0.003] * 50), SOLID, alike=alike)
+    assert said.grade == grade
+    assert (f"{1 - alike:.0%} of what is seen looks otherwise" in said.reason) == (grade != "good")
+
+
 def test_without_a_shape() -> None:
     assert verdict(Course(), None).grade == "poor"
 

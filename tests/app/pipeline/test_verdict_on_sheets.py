@@ -49,6 +49,7 @@ def test_a_sheet_that_stretches_while_nothing_turns_may_be_anything() -> None:
         (Sheet(stretch=0.008, strain_rms=0.02), 500.0, "poor", "change by 2.0%"),
         (Sheet(points=25), 500.0, "fair", "25 points"),
         (Sheet(by_focal=0.032), 500.0, "fair", "off by 3.2%"),
+        (Sheet(by_focal=0.37), 500.0, "poor", "off by 37.0%"),
     ],
 )
 def test_a_sheet_by_its_lengths_points_and_camera(sheet: Sheet, focal_px: float, grade: str, says: str) -> None:

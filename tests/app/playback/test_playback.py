@@ -21,7 +21,7 @@ from reconstruction.basis.modes import modal_basis
 from reconstruction.camera import Camera, quaternion_from_rotation, rotation_from_quaternion
 from tests.synthetic_run import MODES, SIZE, STAGE_MS, write_run
 from tests.synthetic_run import Run as Made
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame, Video
 
 ROOT = Path(__file__).parents[3]
@@ -33,7 +33,7 @@ from pathlib import Path
 import numpy as np
 from app.recording.recording import Recording
 from app.recording.stream import BATCH_ROWS
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame
 
 recording = Recording(Path(sys.argv[1]), configuration={"modes": 4}, size=(160, 120))

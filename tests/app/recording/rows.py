@@ -8,7 +8,7 @@ from rerun.chunk import RrdReader
 
 from app.recording.recording import Recording, entities
 from tests.synthetic_run import SIZE, picture
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame
 
 Rows = dict[tuple[str, str], dict[int | None, Any]]

@@ -14,7 +14,7 @@ from reconstruction.basis.surface import Surface
 from reconstruction.camera import Camera
 from tests.app.recording.rows import Rows, frame, read, record
 from tests.synthetic_run import MODES, SIZE, STAGE_MS, Run, verify, write_run
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.video import Frame
 
 

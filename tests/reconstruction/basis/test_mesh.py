@@ -60,6 +60,24 @@ def test_slivers_behind_slivers_are_dropped_too() -> None:
     assert np.unique(faces).size == len(points)
 
 
+def test_long_triangles_that_bridge_a_dent_are_dropped() -> None:
+    x, y = np.meshgrid(np.arange(11.0), np.arange(6.0))
+    beside = (y == 0) | (np.abs(x - 5) > 2)
+    points = np.stack([x[beside], y[beside]], axis=1)
+    mesh = triangulate(points)
+    assert np.linalg.norm(points[mesh.edges[:, 0]] - points[mesh.edges[:, 1]], axis=1).max() < 5  # the dent is 6 wide
+    assert np.array_equal(mesh.vertices, np.arange(len(points)))
+
+
+def test_parts_with_few_points_stay_in_the_mesh() -> None:
+    x, y = np.meshgrid(np.concatenate([np.arange(0, 10.0), np.arange(10.0, 40, 6)]), np.arange(0.0, 19, 6))
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    points[:, 1] += 1e-3 * points[:, 0] * (points[:, 0] - 34)  # no outline is straight
+    faces = triangulate(points).faces
+    assert (points[faces, 0].max(axis=1) > 33).any()
+    assert np.array_equal(np.unique(faces), np.arange(len(points)))
+
+
 @given(SEEDS)
 def test_no_point_is_lost_with_the_slivers(rng: np.random.Generator) -> None:
     points = spread(rng, 40).T * (1.0, 1e-3)

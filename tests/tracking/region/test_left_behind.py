@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from tests.tracking.scene import texture
 from tracking.features import detect_corners
 from tracking.guarded import GuardedTracker
-from tracking.klt import Observation
+from tracking.observation import Observation
 from tracking.region.left_behind import FRAMES, LeftBehind
 
 Array = NDArray[np.float64]

@@ -1,0 +1,20 @@
+"""What the points of a frame are seen to do."""
+
+from dataclasses import dataclass
+
+from tracking import Array, Flags
+
+
+@dataclass(frozen=True)
+class Observation:
+    """What one frame shows of the points.
+
+    Attributes:
+        points_px: (P, 2) image points W^f, NaN where not visible.
+        visible: (P,) h^f.
+        alike: share of all points seen so far that looked as in the reference frame; others may have slid.
+    """
+
+    points_px: Array
+    visible: Flags
+    alike: float = 1.0
