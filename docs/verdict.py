@@ -125,7 +125,8 @@ def page(cases: list[Case]) -> str:
             "that on lengths by balloons, those here among them; "
             "those on small turns by curtains, those here among them, cone 1 and rolling 1; "
             "those on solids that change by heads and hearts, those here among them; "
-            "that on solids that a sheet would explain better by flags, those here among them; those on what looks otherwise by videos alone.\n",
+            "that on solids that a sheet would explain better by flags, those here among them; "
+            "those on what looks otherwise by videos alone.\n",
             markdown_table(columns, [row(grade, held_back) for grade in reversed(GRADES)]),
             "All of them, best first:\n",
             markdown_table(("case", "e3d %", "error over σ", "verdict", "reason"), sorted(every, key=lambda one: one[1])),
