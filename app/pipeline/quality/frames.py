@@ -20,7 +20,7 @@ POOR_GUESS = 0.005
 FAIR_SHARE, POOR_SHARE = 0.5, 0.3
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 # What no longer looks as it did may have slid: along edges, with highlights and shades. Printed paper on bad days has up to
-# 5 %, a real face that speaks 16 %; smooth drawn faces, where half of the points seen are 3 px off, from 50 % on.
+# 5 %, real faces that speak 16 to 22 %; smooth drawn faces, where half of the points seen are 3 px off, from 50 % on.
 FAIR_UNLIKE, POOR_UNLIKE = 0.2, 0.45
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
 
