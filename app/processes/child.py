@@ -10,10 +10,10 @@ from tempfile import TemporaryFile
 from app.environment import environment
 from app.memory import keep_memory
 
-NICE, NICEST = 5, 19  # of processes that frames do not wait for; the nicest takes what all others leave
+NICEST = 19  # takes what all others leave
 
 
-def child(module: str, *files: int) -> tuple["subprocess.Popen[bytes]", Connection]:
+def child(module: str, *files: int, nice: int = 0) -> tuple["subprocess.Popen[bytes]", Connection]:
     """A process that runs a module of ours, and the connection to it; `connection_to_parent` is its other end.
 
     Not one of multiprocessing's: those run the user's own script again.
@@ -21,10 +21,14 @@ def child(module: str, *files: int) -> tuple["subprocess.Popen[bytes]", Connecti
     Args:
         module: its name.
         files: open files that the process gets, too, by their numbers, which are its further arguments.
+        nice: how much nicer it is, to others of ours, than this one.
     """
     ours, theirs = Pipe()
     with theirs:
-        return started(module, theirs.fileno(), *files), ours
+        process = started(module, theirs.fileno(), *files)
+    if nice:
+        os.setpriority(os.PRIO_PROCESS, process.pid, os.getpriority(os.PRIO_PROCESS, process.pid) + nice)
+    return process, ours
 
 
 def started(module: str, *files: int) -> "subprocess.Popen[bytes]":
@@ -35,14 +39,15 @@ def started(module: str, *files: int) -> "subprocess.Popen[bytes]":
         stdin=subprocess.DEVNULL,
         stdout=2,  # stderr: stdout is for the summary
         pass_fds=files,
-        start_new_session=True,  # Ctrl-C ends the run, which then tells what is left to do
+        # Ctrl-C ends the run, which then tells what is left to do. Sessions of their own would do, too, but to each of
+        # those Linux gives as much as to the run's, however nice they are.
+        process_group=0,
     )
 
 
-def connection_to_parent(*, nice: int = 0) -> Connection:
-    """The connection of a process that `child` began; the process keeps its memory, and is so nice, from now on."""
+def connection_to_parent() -> Connection:
+    """The connection of a process that `child` began; the process keeps its memory from now on."""
     keep_memory()
-    os.nice(nice)
     return Connection(inherited_file(1))
 
 

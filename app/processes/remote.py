@@ -17,12 +17,12 @@ class Remote:
     Args:
         module: what the process runs: it has to `serve`.
         does: what is missing without it, for errors.
-        files: as for `child`.
+        files, nice: as for `child`.
     """
 
-    def __init__(self, module: str, does: str, *files: int) -> None:
+    def __init__(self, module: str, does: str, *files: int, nice: int = 0) -> None:
         self._does = does
-        self._process, self._connection = child(module, *files)
+        self._process, self._connection = child(module, *files, nice=nice)
 
     def send(self, message: object) -> None:
         """A message for it. Raises a UsageError if the process has ended."""

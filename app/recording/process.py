@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, cast
 
 import numpy as np
 
-from app.processes.child import NICE, connection_to_parent, inherited_file
+from app.processes.child import connection_to_parent, inherited_file
 from app.processes.ring import Ring
 from app.terminal.errors import UsageError
 from app.terminal.interrupts import undisturbed
@@ -216,7 +216,7 @@ class RecordingProcess:
 
 def main() -> None:
     """What the other process does: exceptions are sent back, and None once everything is written."""
-    connection = connection_to_parent(nice=NICE)
+    connection = connection_to_parent()
     import cv2
 
     import app.recording.recording  # noqa: F401 (Rerun takes its time to load: while the surface is looked for)

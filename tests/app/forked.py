@@ -25,14 +25,14 @@ class Forked:
         self._lifeline = lifeline
 
     @cached_property
-    def _pid(self) -> int:
+    def pid(self) -> int:
         return int(os.read(self._lifeline, 16))
 
     def kill(self) -> None:
         if self._lifeline < 0:
             return
         with suppress(ProcessLookupError):
-            os.kill(self._pid, signal.SIGKILL)
+            os.kill(self.pid, signal.SIGKILL)
 
     def wait(self) -> None:
         if self._lifeline >= 0:
@@ -78,7 +78,7 @@ def main() -> None:
             module, folder = words.decode().split(" ", 1)
             asked.close()
             signal.signal(signal.SIGCHLD, signal.SIG_DFL)
-            os.setsid()
+            os.setpgid(0, 0)
             os.chdir(folder)
             os.write(lifeline, str(os.getpid()).encode())
             for output in (1, 2):

@@ -10,10 +10,14 @@ from app.processes.remote import Remote, packed, serve
 
 
 class MapProcess:
-    """Calls functions in another process, one after the other; a context manager that ends it, whatever it does."""
+    """Calls functions in another process, one after the other; a context manager that ends it, whatever it does.
 
-    def __init__(self) -> None:
-        self._remote = Remote("app.pipeline.stages.maps", "makes the models")
+    Args:
+        waited_for: whether frames wait for it; else it takes what they leave.
+    """
+
+    def __init__(self, *, waited_for: bool = True) -> None:
+        self._remote = Remote("app.pipeline.stages.maps", "makes the models", nice=0 if waited_for else NICEST)
         self._calls = ThreadPoolExecutor(1, thread_name_prefix="map")  # sends, and waits for what comes back
 
     def begin(self, function: Callable[..., Any], *arguments: object) -> "Future[Any]":
@@ -35,7 +39,7 @@ class MapProcess:
 
 def main() -> None:
     """What the other process does, until nobody listens any more."""
-    connection = connection_to_parent(nice=NICEST)
+    connection = connection_to_parent()
     import reconstruction.mapping.mapper  # noqa: F401 (takes its time: before the first call)
 
     serve(connection, lambda message: message[0](*message[1]))

@@ -48,7 +48,7 @@ class Stages:
     def __enter__(self) -> Self:
         with self._ends:  # what has begun ends if another cannot begin
             if self._launched.apart:
-                self.begin_map = self._ends.enter_context(MapProcess()).begin
+                self.begin_map = self._ends.enter_context(MapProcess(waited_for=not self._config.live)).begin
                 tracking = TrackingProcess(self._launched.tracking, self._launched.pictures)
                 self.tracking = self._ends.enter_context(tracking)
             else:
