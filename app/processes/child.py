@@ -1,6 +1,7 @@
 """Processes of our own, each with a connection to the one that began it."""
 
 import os
+import signal
 import subprocess
 import sys
 from multiprocessing import Pipe
@@ -48,6 +49,7 @@ def started(module: str, *files: int) -> "subprocess.Popen[bytes]":
 def connection_to_parent() -> Connection:
     """The connection of a process that `child` began; the process keeps its memory from now on."""
     keep_memory()
+    signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # what it says on the terminal does not stop it, whatever `stty` says
     return Connection(inherited_file(1))
 
 

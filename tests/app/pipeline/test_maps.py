@@ -54,3 +54,8 @@ def test_it_ends_whatever_it_does() -> None:
         waiting = maps.begin(signal.pause)
     with pytest.raises(UsageError, match="has ended"):
         waiting.result()
+
+
+def test_a_terminal_does_not_stop_what_writes_to_it_from_the_background() -> None:
+    with MapProcess() as maps:
+        assert maps.begin(signal.getsignal, signal.SIGTTOU).result() == signal.SIG_IGN
