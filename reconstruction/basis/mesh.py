@@ -75,22 +75,38 @@ def triangulate(points: Array) -> Mesh:
 
 
 def without_bridges(points: Array, faces: Indices) -> Indices:
-    """Triangles (m, 3) over points (p, 2), bridges on the border peeled off, one after the other; no point is lost."""
+    """Triangles (m, 3) over points (p, 2), bridges on the border peeled off, one after the other.
+
+    The points' shortest tree stays in the mesh, so no point is lost, and it does not fall into pieces.
+    """
     edges, side = np.unique(sides(faces), axis=0, return_inverse=True)
-    side = side.reshape(-1, 3)
+    side, tree = side.reshape(-1, 3), in_shortest_tree(points, edges)
     bridges = long_sides(points, edges)[side].any(axis=1)
     bridges |= smallest_angle(points, faces) < np.deg2rad(SLIVER_DEGREES)
     left = np.flatnonzero(bridges)
     kept = np.ones(len(faces), np.bool_)
     while True:
-        users, sharers = np.bincount(faces[kept].ravel(), minlength=len(points)), np.bincount(side[kept].ravel())
         left = left[kept[left]]
-        out = left[(sharers[side[left]] == 1).any(axis=1) & (users[faces[left]] > 1).all(axis=1)]
+        border = np.bincount(side[kept].ravel())[side[left]] == 1
+        out = left[border.any(axis=1) & ~(border & tree[side[left]]).any(axis=1)]
         if not len(out):
             return faces[kept]
         first = np.full(len(points), len(faces))
-        np.minimum.at(first, faces[out], out[:, None])  # one at a time around each point: its last one stays
+        np.minimum.at(first, faces[out], out[:, None])  # one at a time around each point
         kept[out[(first[faces[out]] == out[:, None]).all(axis=1)]] = False
+
+
+def in_shortest_tree(points: Array, edges: Indices) -> Mask:
+    """Which edges (n, 2), sorted, of a connected mesh of points (p, 2) are in its shortest spanning tree."""
+    from scipy.sparse import csr_array  # takes its time to load, and who only draws needs none
+    from scipy.sparse.csgraph import minimum_spanning_tree
+
+    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).clip(1e-300)
+    tree = minimum_spanning_tree(csr_array((length, edges.T), shape=(len(points), len(points)))).tocoo()
+    inside = np.zeros(len(edges), np.bool_)
+    i, j = np.sort([tree.row, tree.col], axis=0).astype(np.int64)
+    inside[np.searchsorted(edges @ [len(points), 1], i * len(points) + j)] = True
+    return inside
 
 
 def long_sides(points: Array, edges: Indices) -> Mask:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull, Delaunay
 
 from reconstruction import ReconstructionError
+from reconstruction.basis.distances import manhattan
 from reconstruction.basis.mesh import (
     Mesh,
     cross2,
@@ -76,6 +77,14 @@ def test_parts_with_few_points_stay_in_the_mesh() -> None:
     faces = triangulate(points).faces
     assert (points[faces, 0].max(axis=1) > 33).any()
     assert np.array_equal(np.unique(faces), np.arange(len(points)))
+
+
+def test_parts_far_from_each_other_stay_in_one_piece() -> None:
+    x, y = np.meshgrid(np.concatenate([np.arange(6.0), np.arange(20.0, 26)]), np.arange(6.0))
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    mesh = triangulate(points)
+    manhattan(np.pad(points.T, ((0, 1), (0, 0))), mesh.edges)  # else raises
+    assert np.count_nonzero(np.ptp(points[mesh.faces, 0], axis=1) > 10) < 3
 
 
 @given(SEEDS)
