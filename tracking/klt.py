@@ -51,8 +51,7 @@ class PointTracker:
         self._points = self._reference.copy()
         self._affine = np.broadcast_to(np.eye(2), (len(points_px), 2, 2)).copy()
         self._given_up = np.zeros(len(points_px), np.bool_)
-        self._unlike = np.zeros(len(points_px), np.bool_)
-        self._counts = np.zeros(2, np.int64)  # of points seen so far, and of those that were alike
+        self._counts = np.zeros(2, np.int64)  # of points followed so far, and of those that were alike
 
     def give_up(self, points: Flags) -> None:
         """Look for these points (P,) no more."""
@@ -72,7 +71,8 @@ class PointTracker:
         points = self._flow.follow(self._grays, grays, self._points)
         motion = self._motion(points, predicted_px)
         points[~motion.consistent] = np.nan
-        points = self._refine(pictures, points, motion)
+        points, alike = self._refine(pictures, points, motion)
+        self._counts += np.isfinite(points[:, 0]).sum(), alike
         points = self._retrieve(pictures, points, self._expected(points, motion, predicted_px), motion)
         self._grays = grays
         return self._observation(points, motion)
@@ -86,7 +86,7 @@ class PointTracker:
         """
         self._grays = Grays.of(image_bgr)
         self._points = np.full_like(self._reference, np.nan)
-        self._sure[:] = self._unlike[:] = False
+        self._sure[:] = False
         return self.regain(expected_px)
 
     def regain(self, expected_px: Array) -> Observation:
@@ -108,9 +108,8 @@ class PointTracker:
         """What is seen in the picture there is now, and is where the next begins."""
         points[self._given_up | ~_inside(points, self._grays.full.shape)] = np.nan
         self._points, self._affine = points, motion.affine
-        visible = np.isfinite(points[:, 0])
-        self._counts += visible.sum(), (visible & ~self._unlike).sum()
-        return Observation(points.copy(), visible, float(self._counts[1] / max(self._counts[0], 1)))
+        followed, alike = self._counts
+        return Observation(points.copy(), np.isfinite(points[:, 0]), float(alike / followed) if followed else 1.0)
 
     def _motion(self, points: Array, predicted_px: Array | None) -> LocalMotion:
         weight = np.isfinite(points[:, 0]).astype(np.float64)
@@ -120,8 +119,8 @@ class PointTracker:
             weight[helped] = PREDICTION_WEIGHT
         return self._surroundings.motion(points, weight, self._affine)
 
-    def _refine(self, pictures: list[Floats], points: Array, motion: LocalMotion) -> Array:
-        """Remove the drift of tracked points; drop those that look different."""
+    def _refine(self, pictures: list[Floats], points: Array, motion: LocalMotion) -> tuple[Array, int]:
+        """Remove the drift of tracked points; drop those that look different. And how many look as in the reference."""
         points = points.copy()
         seen = np.flatnonzero(np.isfinite(points[:, 0]))
         fine = self._levels[0].align(pictures[0], points[seen], motion.affine[seen], seen, REFINE_STEPS)
@@ -129,11 +128,10 @@ class PointTracker:
         sure = clear & (fine.sigma_px < SURE_PX)
         self._correct(points, seen[sure], fine.points_px[sure])
         self._learn(seen[sure])
-        self._unlike[:] = False
-        self._unlike[seen[~clear]] = True
+        alike = int(clear.sum())
         left = np.flatnonzero(~sure)
         if len(left) == 0:
-            return points
+            return points, alike
         clear, before, which = clear[left], fine.score_before[left], seen[left]
         start, affine = points[which], motion.affine[which]
         where = Fusion(start)
@@ -163,7 +161,7 @@ class PointTracker:
         usual = ((TAILS * motion.scale_px**2 + away) / (TAILS + 2.0))[:, None, None] * np.eye(2)
         where.add(motion.fitted_px[which], usual, motion.support[which] >= MIN_SUPPORT)
         points[which] = np.where(same[:, None], where.points_px, np.nan)
-        return points
+        return points, alike
 
     def _learn(self, sure: Indices) -> None:
         """Take what points looked like in the last picture that were sure there, and are so no more; `sure` (n,) are."""

@@ -12,7 +12,7 @@ class Observation:
     Attributes:
         points_px: (P, 2) image points W^f, NaN where not visible.
         visible: (P,) h^f.
-        alike: share of all points seen so far that looked as in the reference frame; others may have slid.
+        alike: share of the points followed so far that looked as in the reference frame; others may have slid.
     """
 
     points_px: Array

@@ -80,8 +80,9 @@ def without_bridges(points: Array, faces: Indices) -> Indices:
     The points' shortest tree stays in the mesh, so no point is lost, and it does not fall into pieces.
     """
     edges, side = np.unique(sides(faces), axis=0, return_inverse=True)
-    side, tree = side.reshape(-1, 3), in_shortest_tree(points, edges)
-    bridges = long_sides(points, edges)[side].any(axis=1)
+    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    side, tree = side.reshape(-1, 3), in_shortest_tree(length, edges, len(points))
+    bridges = long_sides(length, edges, len(points))[side].any(axis=1)
     bridges |= smallest_angle(points, faces) < np.deg2rad(SLIVER_DEGREES)
     left = np.flatnonzero(bridges)
     kept = np.ones(len(faces), np.bool_)
@@ -96,24 +97,22 @@ def without_bridges(points: Array, faces: Indices) -> Indices:
         kept[out[(first[faces[out]] == out[:, None]).all(axis=1)]] = False
 
 
-def in_shortest_tree(points: Array, edges: Indices) -> Mask:
-    """Which edges (n, 2), sorted, of a connected mesh of points (p, 2) are in its shortest spanning tree."""
+def in_shortest_tree(length: Array, edges: Indices, points: int) -> Mask:
+    """Which edges (n, 2), sorted, of such lengths (n,) are in the shortest spanning tree of so many points."""
     from scipy.sparse import csr_array  # takes its time to load, and who only draws needs none
     from scipy.sparse.csgraph import minimum_spanning_tree
 
-    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1).clip(1e-300)
-    tree = minimum_spanning_tree(csr_array((length, edges.T), shape=(len(points), len(points)))).tocoo()
+    tree = minimum_spanning_tree(csr_array((length.clip(1e-300), edges.T), shape=(points, points))).tocoo()
     inside = np.zeros(len(edges), np.bool_)
     i, j = np.sort([tree.row, tree.col], axis=0).astype(np.int64)
-    inside[np.searchsorted(edges @ [len(points), 1], i * len(points) + j)] = True
+    inside[np.searchsorted(edges @ [points, 1], i * points + j)] = True
     return inside
 
 
-def long_sides(points: Array, edges: Indices) -> Mask:
-    """Which edges (n, 2) of points (p, 2) are much longer than those around."""
-    length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+def long_sides(length: Array, edges: Indices, points: int) -> Mask:
+    """Which edges (n, 2), of such lengths (n,), between so many points are much longer than those around."""
     ends, both = edges.ravel(), np.repeat(length, 2)
-    count = np.bincount(ends, minlength=len(points))
+    count = np.bincount(ends, minlength=points)
     half = np.cumsum(count) - count + (count.clip(1) - 1) // 2  # of each point's edges, shortest first
     usual = both[np.lexsort((both, ends))][half.clip(None, len(both) - 1)]
     return np.asarray(length > LONG_SIDE * usual[edges].max(axis=1).clip(np.median(length)))
