@@ -16,18 +16,14 @@ from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS as FINE_SHAPE
 from reconstruction.mapping.isometric.bundle import GIVE, MOST_GIVE, places_moved
 from reconstruction.mapping.isometric.lengths import adjust_depths, finish_depths
 from reconstruction.mapping.isometric.nodes import edges_between, nodes_of, on_edges, rays_of
-from reconstruction.mapping.isometric.one_frame import mended
-from reconstruction.mapping.isometric.shape_prior import FIRM, ROUGH
 from reconstruction.mapping.isometric.sheet import IsometricSheet, described
 from reconstruction.mapping.isometric.smooth_field import smooth_field
 from reconstruction.mapping.isometric.starts import SOLVER, again, first_depths, once_more
 from reconstruction.mapping.isometric.warps import Warps, finer, smooth_warps
 
 FUNCTIONS, FINE_FUNCTIONS = 40, 60
-BUNDLE_ROUNDS = 12  # of shapes, then places and lengths: with much noise they are still getting better
+BUNDLE_ROUNDS = 12  # of shapes with lengths, then places
 FEW_ROUNDS = 2  # bring most of that in a tenth of a second
-ROUGH_ROUNDS = 2  # in which shapes and lengths lose their noise; after those, lengths go on the way they went
-GOING_ON = 0.7  # of the way of the round before: alone, each round goes a part of it only
 SETTLED = 2e-4  # of the shapes' size: a round that moves them less is the last
 ROUNDS = 6  # at most, of starting frames again that do not fit
 LITTLE_GAIN = 0.1  # of the change: a round that brought less is the last
@@ -134,30 +130,25 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
     Args:
         found: what its keyframes say, image by image.
         W: (F, 2, p) px, its keyframes; anything where not visible.
-        rounds: of shapes, then places and lengths.
+        rounds: of shapes with lengths, then places.
 
     Raises:
         ReconstructionError: a part of it comes out behind the camera.
     """
     seen, shapes, placed = found.warps.weights > 0, found.shapes(), found.warps.placed
     W = np.where(seen[:, None], W, 0.0)
-    rays, way = rays_of(W, found.camera)[:, :2, placed], np.zeros(len(found.log_lengths))
-    for k in range(rounds):
-        prior = found.prior_of(shapes, FIRM if k >= ROUGH_ROUNDS else ROUGH, of_others=True)
-        if k == 0 or not found.far:
-            weights = found.weighed(shapes, W, seen)
-        C = found.bundled(shapes, W, weights, prior)
+    rays = rays_of(W, found.camera)[:, :2, placed]
+    for _ in range(rounds):
+        prior = found.prior_of(shapes, of_others=True)
+        weights = found.weighed(shapes, W, seen)
+        C = found.bundled(shapes, W, weights, prior, free=True)
         places = found.warps.reference.copy()
         slopes = found.warps.field.slopes_at(places[:, placed])[:, : C.shape[2]]
         places[:, placed] += places_moved(C, rays, weights[:, placed], found.functions[placed], slopes)
         found = found.moved(places)
-        way = GOING_ON * way if k >= ROUGH_ROUNDS else 0 * way
-        way = way + np.median(found.lengths.now(C)[0], axis=0) - found.log_lengths
-        found = replace(found, log_lengths=found.log_lengths + way)
-        if not found.far:  # else lengths alone hold frames from turning to their mirror images
-            found = replace(found, give=float(np.clip(np.median(found.length_change(C)), GIVE, MOST_GIVE)))
+        found = replace(found, log_lengths=np.median(found.lengths.now(C)[0], axis=0))  # whatever a few frames say
+        found = replace(found, give=float(np.clip(np.median(found.length_change(C)), GIVE, MOST_GIVE)))
         before, shapes = shapes, C @ found.functions.T
         if np.sqrt(np.nanmean((shapes - before) ** 2)) < SETTLED * np.nanstd(before):
             break
-    C = mended(found, C, W, weights)
-    return replace(found.with_shapes(C @ found.functions.T), usual_change=float(np.median(found.length_change(C))))
+    return replace(found.with_shapes(shapes), usual_change=float(np.median(found.length_change(C))))

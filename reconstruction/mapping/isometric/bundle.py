@@ -7,14 +7,17 @@ does not know that the sheet keeps its lengths. A shape is S = C B, B smooth fun
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg.blas import dsyrk
-from scipy.linalg.lapack import dposv
+from scipy.linalg.blas import dsyrk, dtrsm, dtrsv
+from scipy.linalg.lapack import dposv, dpotrf
 
 from reconstruction.arrays import Array
 from reconstruction.mapping.isometric.shape_prior import ShapePrior
 
 FUNCTIONS, FINE_FUNCTIONS = 60, 100
 GIVE, MOST_GIVE = 0.002, 0.004  # what lengths of paper, and of cloth, change by, noise apart
+# Of free lengths, where they change by the former, in proportion to its square: how they change is alike in neighbours and
+# from frame to frame, so that what really does would go far astray.
+DAMPING, LEAST_CHANGE = 0.1, 0.01
 
 
 @dataclass(frozen=True)
@@ -68,25 +71,36 @@ def data_normal(rays: Array, weights: Array, C: Array, B: Array) -> Array:
     return np.concatenate([np.concatenate(row, axis=2) for row in rows], axis=1)
 
 
-def stepped(C: Array, data: Array, lengths: Lengths, prior: ShapePrior) -> Array:
+def stepped(C: Array, data: Array, lengths: Lengths, prior: ShapePrior, *, free: bool = False) -> Array:
     """Shapes C (F, 3, R) after a Gauss-Newton step towards their lengths, by the data's normal matrix and what others say.
 
-    NaN where there is no such step.
+    NaN where there is no such step. Free lengths are the mean of what they are in all frames, and change with them: that
+    couples the frames by a matrix of the rank of the edges (Woodbury).
     """
     F, _, R = C.shape
     logs, slopes = lengths.now(C)
+    off = logs - (logs.mean(axis=0) if free else lengths.logs)
     root = np.sqrt(lengths.weights) / lengths.give
     halves = [np.ascontiguousarray(half.T) for half in lengths.halves]
     held, away = prior.at(C)
-    step = np.empty((F, 3 * R))
+    factors, step = np.empty((F, 3 * R, 3 * R)), np.full((F, 3 * R), np.nan)
+    damping = DAMPING * max(float(np.median(off**2 @ root**2)) / max((root**2).sum(), 1e-12) / GIVE**2, LEAST_CHANGE)
+    share, shared = 1 / np.sqrt(F * (1 + damping)), np.eye(len(root))
+    through = np.zeros((F if free else 0, 3 * R, len(root)))
     for f, along in enumerate((slopes * root).swapaxes(0, 1)):
         J = (along[0][:, None] * halves[0] + along[1][:, None] * halves[1]).reshape(3 * R, -1)
-        gradient = data[f] @ C[f].ravel() + J @ (root * (logs[f] - lengths.logs)) + held[f] @ away[f]
+        gradient = data[f] @ C[f].ravel() + J @ (root * off[f]) + held[f] @ away[f]
         # One triangle of the symmetric matrix is enough for Cholesky's factors. LAPACK counts along columns.
-        normal = dsyrk(1.0, J.T, 1.0, data[f].T + held[f], trans=1)
-        _, step[f], failed = dposv(normal, gradient, overwrite_a=1, overwrite_b=1)
+        factors[f], failed = dpotrf(dsyrk(1.0, J.T, 1.0, data[f].T + held[f], trans=1), overwrite_a=1)
         if failed:
-            step[f] = np.nan
+            continue
+        step[f] = dtrsv(factors[f], gradient, trans=1)
+        if free:
+            through[f] = dtrsm(share, factors[f], J, trans_a=1)
+            shared = dsyrk(-1.0, through[f], 1.0, shared, trans=1, overwrite_c=1)
+    if free:
+        step += through @ dposv(shared, np.einsum("frn,fr->n", through, np.nan_to_num(step)))[1]
+    step = np.stack([dtrsv(factor, one) for factor, one in zip(factors, step, strict=True)])
     return C - step.reshape(C.shape)
 
 

@@ -1,4 +1,4 @@
-"""A sheet's shape in one frame, its lengths known: in another frame, or anew in a keyframe that is in doubt.
+"""A sheet's shape in one more frame, its lengths known.
 
 Depths along the rays of a smooth image keep lengths about as well in a wrong minimum as in the right one, since an image
 made smooth by itself holds noise. Shapes adjusted to points and lengths at once tell them apart. A frame's is the cheaper
@@ -72,7 +72,7 @@ def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, 
     """Coefficients (1, 3, R) of what costs least in a frame: of shapes, what look-alikes lead to, and the deepest shape.
 
     Args:
-        sheet: that, by keyframes which are not in doubt.
+        sheet: that, by keyframes.
         nodes: its nodes in the frame's image (F = 1).
         image: (2, p) px, the frame's points made smooth.
         W: (2, p) px, as they were seen; finite.
@@ -110,21 +110,3 @@ def cheapest(sheet: IsometricSheet, shapes: Array, W: Array, weights: Array, ste
             break
         shapes, costs = C[going] @ sheet.functions.T, costs[going]
     return np.asarray(best)
-
-
-def mended(found: IsometricSheet, C: Array, W: Array, weights: Array) -> Array:
-    """Coefficients C (F, 3, R) of bundled keyframes, those in doubt started again from others.
-
-    Args:
-        found: the sheet, its lengths by these shapes.
-        C: as above.
-        W: (F, 2, p) px; finite.
-        weights: (F, p) px⁻².
-    """
-    change, C = found.length_change(C), C.copy()
-    doubtful = change > DOUBTED * np.median(change)
-    others, images = found.in_frames(np.flatnonzero(~doubtful)), found.warps.images()
-    for k in np.flatnonzero(doubtful):
-        own = (C[k] @ found.functions.T)[None]
-        C[[k]] = best_of_starts(others, found.nodes.in_frames(np.array([k])), images[k], W[k], weights[k], own)
-    return C

@@ -13,7 +13,6 @@ from reconstruction.arrays import Array
 from reconstruction.camera import nearest_rotation
 
 FIRM = 2e4  # of the bending of unit size that no keyframe shows: likeliest by leaving out one keyframe after the other
-ROUGH = 1e3  # the same while keyframes may still be wrong in common, as images made smooth one by one are
 LEAST = 1e-7  # the same of what does not bend
 ROUNDS = 5  # of turning shapes to their mean
 
@@ -66,14 +65,13 @@ class ShapePrior:
         return nearest_rotation(C @ self.gram @ self.mean.T)
 
 
-def shape_prior(C: Array, B: Array, stiffness: Array, firm: float = FIRM, *, of_others: bool) -> ShapePrior:
+def shape_prior(C: Array, B: Array, stiffness: Array, *, of_others: bool) -> ShapePrior:
     """The prior by shapes C (F, 3, R) in keyframes.
 
     Args:
         C: as above.
         B: (m, R) the functions at well-spread points; the first is 1.
         stiffness: (R,) their bending energy.
-        firm: weight of what no keyframe shows, times the squared size.
         of_others: as in `ShapePrior`.
     """
     centred = B - B.mean(axis=0)
@@ -86,5 +84,5 @@ def shape_prior(C: Array, B: Array, stiffness: Array, firm: float = FIRM, *, of_
         mean = turned.mean(axis=0)
     turns = np.cross(np.eye(3)[:, None], mean.T[None]).swapaxes(1, 2)  # slopes of the mean by its rotation
     axes = np.concatenate([(turned - mean) / np.sqrt(len(C)), turns]).reshape(-1, mean.size)
-    held = (firm * stiffness + LEAST) / float(np.trace(mean @ gram @ mean.T))
+    held = (FIRM * stiffness + LEAST) / float(np.trace(mean @ gram @ mean.T))
     return ShapePrior(mean, gram, axes, np.tile(held, 3), of_others)

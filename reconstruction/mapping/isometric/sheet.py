@@ -11,7 +11,7 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, stepped
 from reconstruction.mapping.isometric.lengths import Edges, mean_log_lengths
 from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, on_edges, rays_of
-from reconstruction.mapping.isometric.shape_prior import FIRM, ShapePrior, shape_prior
+from reconstruction.mapping.isometric.shape_prior import ShapePrior, shape_prior
 from reconstruction.mapping.isometric.smooth_field import ENOUGH, GROSS, SmoothField
 from reconstruction.mapping.isometric.warps import Warps
 from reconstruction.window.robust import geman_mcclure, lengths
@@ -139,25 +139,28 @@ class IsometricSheet:
         """(m, R) what takes the few points of shapes to their coefficients."""
         return np.asarray(np.linalg.pinv(self.functions[self.warps.few]).T)
 
-    def prior_of(self, shapes: Array, firm: float = FIRM, *, of_others: bool) -> ShapePrior:
+    def prior_of(self, shapes: Array, *, of_others: bool) -> ShapePrior:
         """What shapes (F, 3, p) in its keyframes say of others, or of each other."""
         few = self.warps.few
         C = shapes[:, :, few] @ self.projector
-        return shape_prior(C, self.functions[few], self.lengths.stiffness, firm, of_others=of_others)
+        return shape_prior(C, self.functions[few], self.lengths.stiffness, of_others=of_others)
 
     @cached_property
     def prior(self) -> ShapePrior:
         """What its shapes in its keyframes say of other frames'."""
         return self.prior_of(self.shapes(), of_others=False)
 
-    def bundled(self, shapes: Array, W: Array, weights: Array, prior: ShapePrior) -> Array:
-        """Coefficients (F, 3, R) of shapes (F, 3, p) adjusted once to points W (F, 2, p) px with weights (F, p) px⁻²."""
+    def bundled(self, shapes: Array, W: Array, weights: Array, prior: ShapePrior, *, free: bool = False) -> Array:
+        """Coefficients (F, 3, R) of shapes (F, 3, p) adjusted once to points W (F, 2, p) px with weights (F, p) px⁻².
+
+        And to its lengths, or to each other's, if those are free.
+        """
         few, B = self.warps.few, self.functions
         C = shapes[:, :, few] @ self.projector
         rows = few if (weights[:, few] > 0).mean() > ENOUGH else np.arange(len(B))
         rays = rays_of(W[:, :, rows], self.camera)[:, :2]
         normal = data_normal(rays, weights[:, rows] * self.camera.focal_px**2, C, B[rows])
-        step = stepped(C, normal, self.lengths, prior)
+        step = stepped(C, normal, self.lengths, prior, free=free)
         depth = (step[:, 2] @ B[few].T) / shapes[:, 2, few]
         good = (np.abs(np.log(np.maximum(depth, 1e-9))) < np.log(FARTHEST)).all(axis=1)  # of NaN, too, it is not
         return np.asarray(np.where(good[:, None, None], step, C))

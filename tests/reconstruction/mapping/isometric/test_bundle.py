@@ -1,5 +1,7 @@
 """Lengths of edges on shapes of smooth functions, and a step towards them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -44,3 +46,25 @@ def test_steps_without_data_end_where_edges_have_their_lengths() -> None:
     for _ in range(40):
         C = stepped(C, np.zeros((1, 3 * R, 3 * R)), lengths, prior)
     np.testing.assert_allclose(lengths.now(C)[0][0], lengths.logs, atol=1e-5)  # up to the weak pull to the mean
+
+
+def test_free_lengths_are_the_mean_of_all_frames_and_couple_their_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("reconstruction.mapping.isometric.bundle.DAMPING", 0.0)
+    rng = np.random.default_rng(1)
+    lengths, C, size = some_lengths(rng), rng.standard_normal((F, 3, R)), 3 * R
+    lengths = replace(lengths, weights=rng.random(N))
+    half = rng.standard_normal((F, size, size))
+    data = half @ half.transpose(0, 2, 1)
+    prior = ShapePrior(np.zeros((3, R)), np.eye(R), np.zeros((0, size)), np.full(size, 1e-9), of_others=False)
+    logs, slopes = lengths.now(C)
+    root = np.sqrt(lengths.weights) / lengths.give
+    by_frame = np.einsum("hfcn,hnr->fcrn", slopes, lengths.halves).reshape(F, size, N) * root
+    rows = np.zeros((F * size, F * N))  # of all frames' logs less their means, by all shapes
+    for f in range(F):
+        rows[f * size : (f + 1) * size] = np.concatenate([by_frame[f] * ((f == g) - 1 / F) for g in range(F)], axis=1)
+    normal, left = rows @ rows.T, ((logs - logs.mean(axis=0)) * root).ravel()
+    for f in range(F):
+        normal[f * size : (f + 1) * size, f * size : (f + 1) * size] += data[f]
+    gradient = np.concatenate([one @ c.ravel() for one, c in zip(data, C, strict=True)]) + rows @ left
+    expected = C - np.linalg.solve(normal, gradient).reshape(C.shape)
+    np.testing.assert_allclose(stepped(C, data, lengths, prior, free=True), expected, rtol=1e-5, atol=1e-6)
