@@ -15,9 +15,9 @@ from reconstruction.mapping.isometric.shape_prior import ShapePrior
 
 FUNCTIONS, FINE_FUNCTIONS = 60, 100
 GIVE, MOST_GIVE = 0.002, 0.004  # what lengths of paper, and of cloth, change by, noise apart
-# Of free lengths, where they change by the former, in proportion to its square: how they change is alike in neighbours and
-# from frame to frame, so that what really does would go far astray.
-DAMPING, LEAST_CHANGE = 0.1, 0.01
+# Of free lengths that change by the former, and in proportion to the square of what they change by, at least so much of it:
+# how lengths really change is alike in neighbours and from frame to frame, no noise, and would lead them far astray.
+DAMPING, LEAST = 0.1, 0.01
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,9 @@ def data_normal(rays: Array, weights: Array, C: Array, B: Array) -> Array:
 def stepped(C: Array, data: Array, lengths: Lengths, prior: ShapePrior, *, free: bool = False) -> Array:
     """Shapes C (F, 3, R) after a Gauss-Newton step towards their lengths, by the data's normal matrix and what others say.
 
-    NaN where there is no such step. Free lengths are the mean of what they are in all frames, and change with them: that
-    couples the frames by a matrix of the rank of the edges (Woodbury).
+    NaN where there is no such step. Free lengths are the mean of what they are in all F frames, and change with them. That
+    couples the frames: their normal matrix is a block H_f each, less J Jᵀ/F, J (F, 3R, n) the slopes of the n lengths. With
+    H_f = L_f L_fᵀ it is inverted by the matrix I − (L⁻¹J)ᵀ L⁻¹J/F of the lengths alone (Woodbury).
     """
     F, _, R = C.shape
     logs, slopes = lengths.now(C)
@@ -84,8 +85,6 @@ def stepped(C: Array, data: Array, lengths: Lengths, prior: ShapePrior, *, free:
     halves = [np.ascontiguousarray(half.T) for half in lengths.halves]
     held, away = prior.at(C)
     factors, step = np.empty((F, 3 * R, 3 * R)), np.full((F, 3 * R), np.nan)
-    damping = DAMPING * max(float(np.median(off**2 @ root**2)) / max((root**2).sum(), 1e-12) / GIVE**2, LEAST_CHANGE)
-    share, shared = 1 / np.sqrt(F * (1 + damping)), np.eye(len(root))
     through = np.zeros((F if free else 0, 3 * R, len(root)))
     for f, along in enumerate((slopes * root).swapaxes(0, 1)):
         J = (along[0][:, None] * halves[0] + along[1][:, None] * halves[1]).reshape(3 * R, -1)
@@ -96,12 +95,24 @@ def stepped(C: Array, data: Array, lengths: Lengths, prior: ShapePrior, *, free:
             continue
         step[f] = dtrsv(factors[f], gradient, trans=1)
         if free:
-            through[f] = dtrsm(share, factors[f], J, trans_a=1)
-            shared = dsyrk(-1.0, through[f], 1.0, shared, trans=1, overwrite_c=1)
+            through[f] = dtrsm(1.0, factors[f], J, trans_a=1)
     if free:
-        step += through @ dposv(shared, np.einsum("frn,fr->n", through, np.nan_to_num(step)))[1]
+        step += through @ followed(through, step, damping(off, lengths.weights))
     step = np.stack([dtrsv(factor, one) for factor, one in zip(factors, step, strict=True)])
     return C - step.reshape(C.shape)
+
+
+def followed(through: Array, step: Array, damped: float) -> Array:
+    """How the lengths (n,) follow steps (F, k) that take them through (F, k, n), all alike; NaN steps do not count."""
+    frames, flat = len(through) * (1 + damped), through.reshape(-1, through.shape[2])
+    normal = dsyrk(-1.0, flat.T, 1.0, frames * np.eye(through.shape[2]))
+    return np.asarray(dposv(normal, np.nan_to_num(step).ravel() @ flat)[1])
+
+
+def damping(off: Array, weights: Array) -> float:
+    """Of free lengths that are so far off their mean (F, n), weighted (n,)."""
+    squared = float(np.median(off**2 @ weights)) / max(float(weights.sum()), 1e-12)
+    return DAMPING * max(squared / GIVE**2, LEAST)
 
 
 def places_moved(C: Array, rays: Array, weights: Array, B: Array, slopes: Array) -> Array:
