@@ -24,7 +24,7 @@ def evaluated(given: Tracks, folder: Path) -> Evaluation:
 
 @pytest.mark.parametrize(
     ("kind", "found", "bound"),
-    [("head", "rigid", 0.005), pytest.param("rolling", "isometric", 0.0125, marks=pytest.mark.whole)],
+    [("head", "rigid", 0.005), pytest.param("rolling", "isometric", 0.008, marks=pytest.mark.whole)],
 )
 def test_made_up_things_with_gaps_noise_and_gross_errors(tmp_path: Path, kind: str, found: str, bound: float) -> None:
     outcome = evaluated(tracks(scene(kind, 1), SEVERE), tmp_path)
@@ -34,11 +34,21 @@ def test_made_up_things_with_gaps_noise_and_gross_errors(tmp_path: Path, kind: s
 
 
 @pytest.mark.parametrize(
+    ("kind", "bound"),
+    [("rolling", 0.006), pytest.param("cone", 0.0045, marks=pytest.mark.whole)],  # in turns with their lengths 1.2, 1.0 %
+)
+def test_sheets_bent_much_the_same_way_all_along(tmp_path: Path, kind: str, bound: float) -> None:
+    outcome = evaluated(tracks(scene(kind, 1)), tmp_path)
+    assert outcome.score is not None
+    assert outcome.score.e3d <= bound
+
+
+@pytest.mark.parametrize(
     ("kind", "points", "damage", "bound"),
     [
         pytest.param("waving-3", 80, Damage(0.4, 0.3, 0.05), 0.02, marks=pytest.mark.whole),
         pytest.param("rolling", 80, Damage(0.4, 0.3, 0.05), 0.016, marks=pytest.mark.whole),
-        ("cone", 30, Damage(0.2, 0.3), 0.025),  # some frames show fewer than 20 points
+        ("cone", 30, Damage(0.2, 0.3), 0.02),  # some frames show fewer than 20 points
     ],
 )
 def test_sheets_of_few_points_with_gaps(tmp_path: Path, kind: str, points: int, damage: Damage, bound: float) -> None:
