@@ -147,8 +147,9 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
         places[:, placed] += places_moved(C, rays, weights[:, placed], found.functions[placed], slopes)
         found = found.moved(places)
         found = replace(found, log_lengths=np.median(found.lengths.now(C)[0], axis=0))  # whatever a few frames say
-        found = replace(found, give=float(np.clip(np.median(found.length_change(C)), GIVE, MOST_GIVE)))
+        usual = float(np.median(found.length_change(C)))
+        found = replace(found, usual_change=usual, give=float(np.clip(usual, GIVE, MOST_GIVE)))
         before, shapes = shapes, C @ found.functions.T
         if np.sqrt(np.nanmean((shapes - before) ** 2)) < SETTLED * np.nanstd(before):
             break
-    return replace(found.with_shapes(shapes), usual_change=float(np.median(found.length_change(C))))
+    return found.with_shapes(shapes)

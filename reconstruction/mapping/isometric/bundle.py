@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.blas import dsyrk, dtrsm, dtrsv
-from scipy.linalg.lapack import dposv, dpotrf
+from scipy.linalg.lapack import dpotrf
 
 from reconstruction.arrays import Array
+from reconstruction.mapping.isometric.lengths import coupled
 from reconstruction.mapping.isometric.shape_prior import ShapePrior
 
 FUNCTIONS, FINE_FUNCTIONS = 60, 100
@@ -97,16 +98,9 @@ def stepped(C: Array, data: Array, lengths: Lengths, prior: ShapePrior, *, free:
         if free:
             through[f] = dtrsm(1.0, factors[f], J, trans_a=1)
     if free:
-        step += through @ followed(through, step, damping(off, lengths.weights))
+        step += coupled(through, np.nan_to_num(step), F * (1 + damping(off, lengths.weights)))
     step = np.stack([dtrsv(factor, one) for factor, one in zip(factors, step, strict=True)])
     return C - step.reshape(C.shape)
-
-
-def followed(through: Array, step: Array, damped: float) -> Array:
-    """How the lengths (n,) follow steps (F, k) that take them through (F, k, n), all alike; NaN steps do not count."""
-    frames, flat = len(through) * (1 + damped), through.reshape(-1, through.shape[2])
-    normal = dsyrk(-1.0, flat.T, 1.0, frames * np.eye(through.shape[2]))
-    return np.asarray(dposv(normal, np.nan_to_num(step).ravel() @ flat)[1])
 
 
 def damping(off: Array, weights: Array) -> float:

@@ -130,7 +130,7 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
     The frames are coupled only through n mean lengths: the normal matrix is one block a frame less a matrix of rank n,
     and is inverted as such (Woodbury).
     """
-    (F, r), n = c.shape, len(edges.ends)
+    F, r = c.shape
     w = edges.weights * F / edges.weights.sum()
     root = w / np.sqrt(np.maximum(w.sum(axis=0), 1e-12))
     c = c - c[:, :1].mean() * np.eye(r)[0]
@@ -149,9 +149,7 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
             for L, part, one in zip(D, through, y, strict=True):  # L⁻¹ of them, in place: BLAS counts along columns
                 dtrsm(1.0, L.T, part.T, side=1, overwrite_b=1)
                 dtrsv(L.T, one, trans=1, overwrite_x=1)
-            through = through.reshape(F * r, n)
-            shared = dposv(dsyrk(-1.0, through.T, 1.0, np.eye(n)), through.T @ y.ravel())[1]
-            y += (through @ shared).reshape(F, r)
+            y += coupled(through, y, 1.0)
             new = c - [dtrsv(L.T, one) for L, one in zip(D, y, strict=True)]
             new[:, 0] -= new[:, 0].mean()
             logs, shares = edges.logs_and_shares(new)
@@ -166,6 +164,13 @@ def adjust_depths(edges: Edges, c: Array, stiffness: Array, solver: Solver) -> A
         if settled:
             break
     return c
+
+
+def coupled(through: Array, y: Array, own: float) -> Array:
+    """T (own − Tᵀ T)⁻¹ Tᵀ y, T (F, k, n) and y (F, k): what frames gain by what couples them (Woodbury)."""
+    T = through.reshape(-1, through.shape[2])
+    normal = dsyrk(-1.0, T.T, 1.0, own * np.eye(T.shape[1]))
+    return np.asarray((T @ dposv(normal, T.T @ y.ravel())[1]).reshape(y.shape))
 
 
 def finish_depths(

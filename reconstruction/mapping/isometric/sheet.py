@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from reconstruction import ReconstructionError
-from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, stepped
 from reconstruction.mapping.isometric.lengths import Edges, mean_log_lengths
@@ -214,16 +214,6 @@ class IsometricSheet:
         warps = replace(self.warps, coefficients=to_images @ image.transpose(0, 2, 1))
         nodes = replace(self.nodes, images=warps.images(self.nodes.points), middles=warps.images_at(self.nodes.halfway))
         return replace(self, warps=warps, nodes=nodes, coefficients=np.log(shapes[:, 2, few]) @ to_depths.T)
-
-    def in_frames(self, chosen: Indices) -> "IsometricSheet":
-        """The same by some of its keyframes, its lengths as they are."""
-        return replace(
-            self,
-            warps=self.warps.in_frames(chosen),
-            nodes=self.nodes.in_frames(chosen),
-            coefficients=self.coefficients[chosen],
-            strain=self.strain[chosen],
-        )
 
 
 def described(

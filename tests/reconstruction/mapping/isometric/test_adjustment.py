@@ -10,7 +10,7 @@ import pytest
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
-from reconstruction.mapping.isometric.adjustment import bundled, in_halves, sheet
+from reconstruction.mapping.isometric.adjustment import bundled, by_part, in_halves, sheet
 from reconstruction.mapping.isometric.bundle import GIVE
 from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.one_frame import cheapest, shape_in
@@ -112,6 +112,17 @@ def test_points_that_slip_together_count_by_the_shapes_not_by_smooth_images(monk
     by_images = found.weighed(found.shapes(), W, np.ones((20, 250), bool))
     monkeypatch.setattr(IsometricSheet, "weighed", lambda *_: by_images)
     assert by_shapes < 0.8 * error(bundled(found, W), S)
+
+
+def test_a_frame_is_right_though_its_keyframe_is_in_another_minimum() -> None:
+    W, S, found = waving()
+    frame = 3
+    coefficients = found.coefficients.copy()
+    coefficients[frame] = found.coefficients[np.argmax([e3d(s[None], S[frame : frame + 1])[0] for s in found.shapes()])]
+    wrong = replace(found, coefficients=coefficients)
+    assert e3d(wrong.shapes(), S)[frame] > 0.1
+    shape = shape_in(bundled(wrong, W, rounds=1), W[frame], SEEN[frame]).shape
+    assert float(e3d(shape[None], S[frame : frame + 1])[0]) < 0.03
 
 
 def test_points_of_something_else_count_for_little_and_spoil_nothing() -> None:
@@ -223,7 +234,7 @@ def test_lengths_of_cloth_give_more_than_those_of_paper() -> None:
 
 def test_what_a_frame_hides_follows_shapes_of_keyframes() -> None:
     W, S, found = waving()
-    others = found.in_frames(np.delete(np.arange(len(W)), 7))
+    others = by_part(found, np.delete(np.arange(len(W)), 7))
     seen = W[7, 0] < np.quantile(W[7, 0], 0.6)
     shape = shape_in(others, W[7], seen).shape
     assert float(e3d(shape[None], S[7:8]).mean()) < 0.04
