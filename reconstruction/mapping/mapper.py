@@ -5,10 +5,11 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
-from reconstruction.arrays import Array, Mask
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.mapping.bootstrap import bootstrap
@@ -17,12 +18,13 @@ from reconstruction.mapping.map import Map, map_of
 from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations
 from reconstruction.mapping.start import Start, at_once
-from reconstruction.settings import FIRST_LOOKS, Settings
+from reconstruction.settings import FIRST_LOOKS, MORE_MODES, Settings
 
 LATENCY = 90  # frames after which a map that another process makes is in force: three seconds of most videos
 FIRST_LATENCY = 0.25  # the same of a first model, of the frames it is made of: it takes a fraction of the time
 CATCH_UP, LIVE_CATCH_UP = 4, 2  # frames that get their shapes with each new one; live ones come on time meanwhile
 FEWEST = 10  # keyframes for a map
+FEW_ROUNDS = 24  # of learning on the way
 MORE = 2  # times as many keyframes of a solid at the end: what deforms must be seen from many sides
 FEWEST_POINTS = 4  # that a frame shows, for a first model
 GROWN = 1.3  # times as far apart as at the last map the keyframes are before there is another,
@@ -137,7 +139,7 @@ class Mapper:
         (W, visible, _), more = self._keyframes.spread(), cache(lambda: spread_of(frames, MORE * KEYFRAMES))
         asked = camera, self._settings.estimate_focal, self._known, self.start, self._given, self._settings.kind
         found = map_of(W, visible, *asked, last=lambda: more()[:2])
-        if found is not None and found.rest.kind == "rigid":
+        if found is not None:
             found = with_deformations(found, self._settings, *more())
         found = found or self._found
         return found and self._begin and nearest_first(found, *self._begin)
@@ -175,7 +177,7 @@ class Mapper:
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
             self._version, self._extent = keyframes.version, keyframes.extent
             asked = camera, self._settings.estimate_focal, self._known, at_once, self._given, self._settings.kind
-            begun = self.start(with_modes, map_of, self._settings, *keyframes.spread()[:2], *asked)
+            begun = self.start(on_the_way, self._settings, *keyframes.spread(), *asked)
             self._map_job = Job(begun, self._frame + self.latency)
 
     def _another(self, begin: tuple[Array, Mask]) -> Map | None:
@@ -211,3 +213,15 @@ def with_modes(make: Callable[..., Map | None], settings: Settings, *arguments: 
     """A map that is made with its modes, so that no frame has to wait for them."""
     found = make(*arguments)
     return found and replace(found, model=found.modelled(settings))
+
+
+def on_the_way(settings: Settings, W: Array, visible: Mask, frames: Indices, *asked: Any) -> Map | None:
+    """The map of keyframes while more are to come, with its modes; arguments as for `with_deformations` and `map_of`.
+
+    Deformations learned from them give a better rest shape. The Gaussian does not stay: it knows none that are to come.
+    """
+    found = map_of(W, visible, *asked)
+    if found is None:
+        return None
+    found = with_deformations(found, settings, W, visible, frames, MORE_MODES, FEW_ROUNDS)
+    return replace(found, model=found.model or found.modelled(settings), deformations=None)

@@ -12,7 +12,7 @@ from reconstruction.mapping.map import Map
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.deformations import Learned, going_with_turn
-from reconstruction.mapping.solid.deforming.learning import POINTS, RIGHTED, learned
+from reconstruction.mapping.solid.deforming.learning import POINTS, RIGHTED, ROUNDS, learned
 from reconstruction.mapping.solid.deforming.own_motion import own_motion
 from reconstruction.mapping.solid.placing import well_spread
 from reconstruction.settings import MOST_MODES, Settings
@@ -29,8 +29,18 @@ DRIFT = 0.017  # of the size, RMS: tracks of rigid things are off by up to 0.015
 BETTER = 0.5  # times what the rigid shape is off there
 
 
-def with_deformations(found: Map, settings: Settings, W: Array, visible: Mask, frames: Indices) -> Map:
+def with_deformations(
+    found: Map,
+    settings: Settings,
+    W: Array,
+    visible: Mask,
+    frames: Indices,
+    modes: int = MOST_MODES,
+    rounds: int = ROUNDS,
+) -> Map:
     """A solid's map with its deformations, if these predict what keyframes show in points that they are not learned from.
+
+    Any other map stays.
 
     Args:
         found: the map of keyframes,
@@ -38,32 +48,37 @@ def with_deformations(found: Map, settings: Settings, W: Array, visible: Mask, f
         W: (K, 2, p) px the keyframes; anything where not visible.
         visible: (K, p).
         frames: (K,) their numbers.
+        modes: so many, if that is not settled: 40 take a quarter of the time that 80 take, and what they leave over leads
+            astray in many rounds.
+        rounds: of expectation and maximisation.
     """
+    if found.rest.kind != "rigid":
+        return found
     if settings.deformation not in ("auto", "general") or settings.priors.keys() & {"rest", "smoothness"}:
         return found
     order = np.argsort(frames)
     W, visible = np.where(visible[:, None], W, 0.0)[order], visible[order]
     sound, rigid = without_outliers(W, visible), found.in_order(order)
     try:
-        model, first = begun(rigid, settings, W, visible, sound)
+        model, first = begun(rigid, settings, W, visible, sound, modes)
         hidden = sound & (np.random.default_rng(0).random(visible.shape) < HIDDEN)
         trial = learned(model, W, visible & ~hidden, first, first.log_s, TRIAL)
         if not predicted(model, W, hidden, trial, rigid):
             return found
         latest = about(rigid, model, trial)  # whose poses tell better what moves together
-        again = modelled(latest, settings, W, sound)
+        again = modelled(latest, settings, W, sound, modes)
         log_s = first.log_s + np.log(model.scale / again.scale)  # else each start would let them go further
-        latest = about(latest, again, learned(again, W, visible, carried(model, trial, again), log_s))
+        latest = about(latest, again, learned(again, W, visible, carried(model, trial, again), log_s, rounds))
     except np.linalg.LinAlgError:  # of points that lie as none do
         return found
     return latest.in_order(np.argsort(order))
 
 
-def modelled(found: Map, settings: Settings, W: Array, sound: Mask) -> Model:
+def modelled(found: Map, settings: Settings, W: Array, sound: Mask, modes: int = MOST_MODES) -> Model:
     """Modes by what moves together, for keyframes in their order; arguments as for `begun`."""
     motion = found.rest.motion
     apart = own_motion((seen_by(found.camera, motion) - W) / motion.s[:, None, None], sound)
-    return replace(found, modes=MOST_MODES, model=None).modelled(settings, own_motion=apart)
+    return replace(found, modes=modes, model=None).modelled(settings, own_motion=apart)
 
 
 def carried(model: Model, known: Learned, again: Model) -> State:
@@ -79,7 +94,9 @@ def carried(model: Model, known: Learned, again: Model) -> State:
     )
 
 
-def begun(found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) -> tuple[Model, State]:
+def begun(
+    found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask, modes: int = MOST_MODES
+) -> tuple[Model, State]:
     """Modes by what moves together, and pose and Λ' of each keyframe by itself.
 
     Args:
@@ -88,8 +105,9 @@ def begun(found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) 
         W: (K, 2, p) px; finite.
         visible: (K, p).
         sound: (K, p) of that, what is not grossly wrong.
+        modes: as for `with_deformations`.
     """
-    motion, model = found.rest.motion, modelled(found, settings, W, sound)
+    motion, model = found.rest.motion, modelled(found, settings, W, sound, modes)
     some = well_spread(model.B[:3], visible, POINTS)
     few = model.of_points(some)
     energy = build_energy(few, "general", settings.priors)

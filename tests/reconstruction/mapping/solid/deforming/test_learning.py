@@ -8,7 +8,8 @@ from reconstruction.basis.model import facing
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
-from reconstruction.mapping.map import Map
+from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.mapper import on_the_way
 from reconstruction.mapping.solid.deforming import learned_map, rounds
 from reconstruction.mapping.solid.deforming.learned_map import begun, with_deformations
 from reconstruction.mapping.solid.deforming.learning import POINTS, learned
@@ -98,6 +99,21 @@ def test_keyframes_stay_in_the_order_of_the_map() -> None:
     assert known.deformations is not None
     turn = known.rest.motion.R @ known.rest.motion.R[0].T @ found.rest.motion.R[0] @ found.rest.motion.R.swapaxes(1, 2)
     assert np.degrees(np.arccos((np.trace(turn, axis1=1, axis2=2).clip(-1, 3) - 1) / 2)).max() < 10
+
+
+@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
+def test_on_the_way_the_rest_shape_is_learned_too(camera: Camera) -> None:
+    """Without what deformations are like: the Gaussian knows none that are to come."""
+    shapes, W, visible = keyframes(0.09, camera)
+    asked = np.where(visible[:, None], W, np.nan), visible
+    rigid, found = map_of(*asked, camera, False), on_the_way(Settings(), *asked, FRAMES, camera, False)
+    assert rigid is not None
+    assert found is not None
+    assert found.model is not None
+    assert found.deformations is None
+    errors = [e3d(np.repeat(one.rest.motion.shape[None], K, axis=0), shapes).mean() for one in (rigid, found)]
+    assert errors[1] < 0.9 * errors[0]
+    assert errors[1] < 0.058
 
 
 def test_the_mirror_image_has_the_mirrored_deformations() -> None:
