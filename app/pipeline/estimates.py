@@ -19,6 +19,8 @@ from reconstruction.estimate import ShapeEstimate
 from reconstruction.evaluation import Score, followed, score
 from tracking.tracks import Truth
 
+ROUNDING = 1e-6  # of the size
+
 
 @dataclass
 class Collected:
@@ -145,21 +147,23 @@ def save_shapes(
 
     And sigma (F, P), the standard deviations of the vertices, if they were asked for; strain and curvature (F, P), see
     `reconstruction.basis.surface`. Lengths are in pixels of the first
-    frame, or in another unit, of which a pixel has so many. Frames in which the surface was lost get rows of NaN.
+    frame, or in another unit, of which a pixel has so many. Frames in which the surface was lost get rows of NaN; so do R
+    and Lambda where another model was in force.
 
     Raises:
         UsageError: the file cannot be written.
     """
     frames = sorted({*estimates, *lost})
     nothing = without_shape(next(iter(estimates.values())))
-    rows = [estimates.get(frame, nothing) for frame in frames]
+    rows, r = [estimates.get(frame, nothing) for frame in frames], len(model.basis.eigenvalues)
     basis, sigma = model.basis, sigmas(rows)
+    poses = [(e.R, e.Lambda) if is_of(e, model) else (np.full((3, 3), np.nan), np.full((3, r), np.nan)) for e in rows]
     arrays: dict[str, Any] = {
         "S": unit * np.stack([e.shape for e in rows]),
-        "R": np.stack([e.R for e in rows]),
+        "R": np.stack([R for R, _ in poses]),
         "s": np.array([e.s for e in rows]) / unit,
         "t": np.stack([e.t for e in rows]),
-        "Lambda": unit * np.stack([e.Lambda for e in rows]),
+        "Lambda": unit * np.stack([Lambda for _, Lambda in poses]),
         "visible": np.stack([e.visible for e in rows]),
         "frames": np.array(frames),
         "faces": model.mesh.faces,
@@ -177,6 +181,15 @@ def save_shapes(
     arrays["curvature"] = np.stack([surface.curvature(shape) for shape in arrays["S"]])
     with writable(path) as file:
         np.savez_compressed(file, **arrays)
+
+
+def is_of(estimate: ShapeEstimate, model: Model) -> bool:
+    """Whether the pose and Λ of an estimate are of that model: then its shape follows from them."""
+    if len(estimate.Lambda.T) != len(model.basis.eigenvalues):
+        return False
+    scale = 1.0 if model.camera.perspective else estimate.s
+    off = estimate.shape - scale * estimate.R @ model.basis.deform(estimate.Lambda)
+    return bool(np.ptp(off, axis=1).max() < ROUNDING * np.ptp(estimate.shape))
 
 
 def without_shape(like: ShapeEstimate) -> ShapeEstimate:
