@@ -109,9 +109,7 @@ class Mapper:
                 self._first.append((W, visible))
             self._look_first(self._first, camera)
         self._look_again(camera)
-        if self._first is not None:
-            return self._first_model()
-        return self._another(begin)
+        return self._in_force(begin)
 
     def finish(self, camera: Camera) -> Map | None:
         """The model of fewer first frames than are wanted, since no more come; None if there was one, or no frame.
@@ -124,8 +122,8 @@ class Mapper:
         self.first_frames = max(self.first_frames, len(self._first))
         W, visible = stacked(self._first)
         begun = self._first_job.future.result() if self._first_job else None
-        self._first = None
-        return begun or bootstrap(W, visible, camera, self._settings, last=True)
+        found = begun or bootstrap(W, visible, camera, self._settings, last=True)
+        return found and self._taken(found, self._begin or (W[0], visible[0]))
 
     def final(self, camera: Camera, frames: Iterable[tuple[Array, Mask]]) -> Map | None:
         """The map of the keyframes of all frames, posed first as in the first frame; None if they do not tell.
@@ -145,27 +143,23 @@ class Mapper:
         return found and self._begin and nearest_first(found, *self._begin)
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
-        """Begin a first model, if it is time."""
-        n = len(first)
+        """Begin a first model, if it is time; at last by keyframes, where nothing goes on meanwhile.
+
+        Else a guess comes first: who looks on sees something soon, and files are reconstructed once more.
+        """
+        n, keyframes, settings = len(first), self._keyframes, self._settings
         if self._first_job is None and (n in self._looks or self._looked < self._looks[-1] < n):
-            arguments = *stacked(first), camera, self._settings, n >= self._looks[-1]
+            last = n >= self._looks[-1]
+            frames = *stacked(first), camera, settings
             due = self._frame + int(FIRST_LATENCY * n if self.latency else 0)
-            if self._live:
-                begun = self.start(with_modes, bootstrap, self._settings, *arguments)
+            if last and not self.latency and len(self._looks) > 1 and keyframes and len(keyframes.frames) >= FEWEST:
+                begun = self.start(first_of_all, *frames, *self._asked(camera))
+            elif self._live:
+                begun = self.start(with_modes, bootstrap, settings, *frames, last)
             else:  # all frames wait for it, and who has no other work makes the modes sooner
-                begun = self.start(bootstrap, *arguments)
+                begun = self.start(bootstrap, *frames, last)
             self._first_job = Job(begun, due)
             self.first_frames = self._looked = n
-
-    def _first_model(self) -> Map | None:
-        """The first model, once it is in force."""
-        if not self._ready(self._first_job):
-            return None
-        assert self._first_job is not None
-        found, self._first_job = self._first_job.future.result(), None
-        if found is not None:
-            self._first, self._known = None, found.rest.motion.shape
-        return found
 
     def _look_again(self, camera: Camera) -> None:
         """Begin a map, if the keyframes have more to tell than when they were last looked at."""
@@ -175,25 +169,37 @@ class Mapper:
         if keyframes is None or self._map_job or self._frame + 1 < self._looks[-1] or len(keyframes.frames) < FEWEST:
             return
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
-            self._version, self._extent = keyframes.version, keyframes.extent
-            asked = camera, self._settings.estimate_focal, self._known, at_once, self._given, self._settings.kind
-            begun = self.start(on_the_way, self._settings, *keyframes.spread(), *asked)
+            begun = self.start(with_modes, on_the_way, self._settings, *self._asked(camera))
             self._map_job = Job(begun, self._frame + self.latency)
 
-    def _another(self, begin: tuple[Array, Mask]) -> Map | None:
-        """The map, once it is in force, posed first as in the frame where it begins."""
-        if not self._ready(self._map_job):
-            return None
-        assert self._map_job is not None
-        found, self._map_job = self._map_job.future.result(), None
-        if found is None:
-            return None
-        self._found, self._known = found, found.rest.motion.shape
-        return nearest_first(found, *begin)
+    def _asked(self, camera: Camera) -> tuple[Any, ...]:
+        """What `on_the_way` is to make a map of: the keyframes as they are now."""
+        keyframes, settings = self._keyframes, self._settings
+        assert keyframes is not None
+        self._version, self._extent = keyframes.version, keyframes.extent
+        told = camera, settings.estimate_focal, self._known, at_once, self._given, settings.kind
+        return settings, *keyframes.spread(), *told
 
-    def _ready(self, job: Job | None) -> bool:
-        """Whether a job's result is in force."""
-        return job is not None and (job.future.done() if self._live else self._frame >= job.due)
+    def _in_force(self, begin: tuple[Array, Mask]) -> Map | None:
+        """The model that is in force from now on, posed first as in the frame where it begins."""
+        first = self._first is not None
+        job = self._first_job if first else self._map_job
+        if job is None or not (job.future.done() if self._live else self._frame >= job.due):
+            return None
+        if first:
+            self._first_job = None
+        else:
+            self._map_job = None
+        found = job.future.result()
+        return found and self._taken(found, begin)
+
+    def _taken(self, found: Map, begin: tuple[Array, Mask]) -> Map:
+        """A model that is in force from now on, posed first as in the frame where it begins."""
+        self._first, self._known = None, found.rest.motion.shape
+        if found.seen is None:  # by first frames, in their order
+            return found
+        self._found = found
+        return nearest_first(found, *begin)
 
 
 def stacked(frames: list[tuple[Array, Mask]]) -> tuple[Array, Mask]:
@@ -212,16 +218,24 @@ def nearest_first(found: Map, W: Array, visible: Mask) -> Map:
 def with_modes(make: Callable[..., Map | None], settings: Settings, *arguments: object) -> Map | None:
     """A map that is made with its modes, so that no frame has to wait for them."""
     found = make(*arguments)
-    return found and replace(found, model=found.modelled(settings))
+    return found and replace(found, model=found.model or found.modelled(settings))
 
 
-def on_the_way(settings: Settings, W: Array, visible: Mask, frames: Indices, *asked: Any) -> Map | None:
-    """The map of keyframes while more are to come, with its modes; arguments as for `with_deformations` and `map_of`.
+def on_the_way(settings: Settings, W: Array, visible: Mask, frames: Indices, *told: Any) -> Map | None:
+    """The map of keyframes while more are to come; arguments as for `with_deformations` and `map_of`.
 
     Deformations learned from them give a better rest shape. The Gaussian does not stay: it knows none that are to come.
     """
-    found = map_of(W, visible, *asked)
-    if found is None:
-        return None
-    found = with_deformations(found, settings, W, visible, frames, MORE_MODES, FEW_ROUNDS)
-    return replace(found, model=found.model or found.modelled(settings), deformations=None)
+    found = map_of(W, visible, *told)
+    return found and replace(
+        with_deformations(found, settings, W, visible, frames, MORE_MODES, FEW_ROUNDS), deformations=None
+    )
+
+
+def first_of_all(W: Array, visible: Mask, camera: Camera, settings: Settings, *keyframes: Any) -> Map | None:
+    """The first model: what first frames are sure of, else what keyframes tell, else a guess by the first frames.
+
+    Arguments as for `bootstrap` and `on_the_way`.
+    """
+    first = W, visible, camera, settings
+    return bootstrap(*first, False) or on_the_way(*keyframes) or bootstrap(*first, True)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -88,6 +89,22 @@ def test_live_ones_are_in_force_as_soon_as_they_are_there() -> None:
     later.answer()
     assert adopted(used, range(90, 100)) == [90]
     assert used.first_frames == 82
+
+
+@pytest.mark.parametrize(("latency", "by"), [(0, "keyframes"), (LATENCY, "frames")])
+def test_a_guess_comes_first_where_others_wait(latency: int, by: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = np.ones(POINTS, bool)
+    monkeypatch.setattr(mapper, "map_of", lambda W, *_: replace(model(len(W)), seen=np.ones((len(W), POINTS), bool)))
+    used = Mapper(Settings(), at_once, latency=latency)
+    found = [used.add(image(f), seen, CAMERA, (image(0), seen)) for f in range(FIRST_LOOKS[-1] + 20)]
+    first = next(one for one in found if one is not None)
+    assert len(first.rest.motion.s) == (KEYFRAMES if by == "keyframes" else FIRST_LOOKS[-1])
+    assert (first.seen is None) == (by == "frames")
+
+
+def test_where_keyframes_do_not_tell_it_begins_with_a_guess(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mapper, "map_of", lambda *_: None)
+    assert adopted(Mapper(Settings()), range(100)) == [FIRST_LOOKS[-1] - 1]
 
 
 def test_another_look_when_the_views_have_grown() -> None:
