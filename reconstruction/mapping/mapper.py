@@ -15,6 +15,7 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.bootstrap import bootstrap
 from reconstruction.mapping.keyframes import KEYFRAMES, Keyframes, difference, spread_of
 from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.selection import Kind
 from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations
 from reconstruction.mapping.start import Start, at_once
@@ -135,9 +136,8 @@ class Mapper:
         if self._keyframes is None or not self._keyframes.frames:
             return None
         (W, visible, _), more = self._keyframes.spread(), cache(lambda: spread_of(frames, MORE * KEYFRAMES))
-        asked = camera, self._settings.estimate_focal, self._known, self.start, self._given, self._settings.kind
-        found = map_of(W, visible, *asked, last=lambda: more()[:2])
-        if found is not None:
+        found = map_of(W, visible, *self._told(camera, self.start), last=lambda: more()[:2])
+        if found is not None and found.rest.kind == "rigid":
             found = with_deformations(found, self._settings, *more())
         found = found or self._found
         return found and self._begin and nearest_first(found, *self._begin)
@@ -152,7 +152,13 @@ class Mapper:
             last = n >= self._looks[-1]
             frames = *stacked(first), camera, settings
             due = self._frame + int(FIRST_LATENCY * n if self.latency else 0)
-            if last and not self.latency and len(self._looks) > 1 and keyframes and len(keyframes.frames) >= FEWEST:
+            if (
+                last
+                and not self.latency
+                and settings.bootstrap_frames == "auto"
+                and keyframes
+                and len(keyframes.frames) >= FEWEST
+            ):
                 begun = self.start(first_of_all, *frames, *self._asked(camera))
             elif self._live:
                 begun = self.start(with_modes, bootstrap, settings, *frames, last)
@@ -174,11 +180,15 @@ class Mapper:
 
     def _asked(self, camera: Camera) -> tuple[Any, ...]:
         """What `on_the_way` is to make a map of: the keyframes as they are now."""
-        keyframes, settings = self._keyframes, self._settings
-        assert keyframes is not None
-        self._version, self._extent = keyframes.version, keyframes.extent
-        told = camera, settings.estimate_focal, self._known, at_once, self._given, settings.kind
-        return settings, *keyframes.spread(), *told
+        assert self._keyframes is not None
+        self._version, self._extent = self._keyframes.version, self._keyframes.extent
+        return self._settings, *self._keyframes.spread(), *self._told(camera, at_once)
+
+    def _told(
+        self, camera: Camera, start: Start
+    ) -> tuple[Camera, bool, Array | None, Start, RestShape | None, Kind | None]:
+        """What `map_of` is told beside the keyframes."""
+        return camera, self._settings.estimate_focal, self._known, start, self._given, self._settings.kind
 
     def _in_force(self, begin: tuple[Array, Mask]) -> Map | None:
         """The model that is in force from now on, posed first as in the frame where it begins."""
@@ -186,10 +196,7 @@ class Mapper:
         job = self._first_job if first else self._map_job
         if job is None or not (job.future.done() if self._live else self._frame >= job.due):
             return None
-        if first:
-            self._first_job = None
-        else:
-            self._map_job = None
+        self._first_job, self._map_job = (None, self._map_job) if first else (self._first_job, None)
         found = job.future.result()
         return found and self._taken(found, begin)
 
@@ -227,9 +234,10 @@ def on_the_way(settings: Settings, W: Array, visible: Mask, frames: Indices, *to
     Deformations learned from them give a better rest shape. The Gaussian does not stay: it knows none that are to come.
     """
     found = map_of(W, visible, *told)
-    return found and replace(
-        with_deformations(found, settings, W, visible, frames, MORE_MODES, FEW_ROUNDS), deformations=None
-    )
+    if found is None or found.rest.kind != "rigid":
+        return found
+    learned = with_deformations(found, settings, W, visible, frames, MORE_MODES, FEW_ROUNDS)
+    return replace(learned, deformations=None)
 
 
 def first_of_all(W: Array, visible: Mask, camera: Camera, settings: Settings, *keyframes: Any) -> Map | None:

@@ -1,6 +1,6 @@
 """When models are made, and from which frame on they are in force."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
 
@@ -105,6 +105,18 @@ def test_a_guess_comes_first_where_others_wait(latency: int, by: str, monkeypatc
 def test_where_keyframes_do_not_tell_it_begins_with_a_guess(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mapper, "map_of", lambda *_: None)
     assert adopted(Mapper(Settings()), range(100)) == [FIRST_LOOKS[-1] - 1]
+
+
+def test_frames_are_read_once_more_for_a_solid_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    def frames() -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        raise AssertionError("read")
+        yield
+
+    flat = replace(model(1), rest=replace(model(1).rest, kind="plane"))
+    monkeypatch.setattr(mapper, "map_of", lambda *_, **__: flat)
+    used = Mapper(Settings())
+    adopted(used, range(20))
+    assert used.final(CAMERA, frames()) is not None
 
 
 def test_another_look_when_the_views_have_grown() -> None:

@@ -40,8 +40,6 @@ def with_deformations(
 ) -> Map:
     """A solid's map with its deformations, if these predict what keyframes show in points that they are not learned from.
 
-    Any other map stays.
-
     Args:
         found: the map of keyframes,
         settings: and how to reconstruct; a deformation, pull to rest or smoothness that was asked for stays.
@@ -52,8 +50,6 @@ def with_deformations(
             astray in many rounds.
         rounds: of expectation and maximisation.
     """
-    if found.rest.kind != "rigid":
-        return found
     if settings.deformation not in ("auto", "general") or settings.priors.keys() & {"rest", "smoothness"}:
         return found
     order = np.argsort(frames)
