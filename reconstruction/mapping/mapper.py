@@ -19,13 +19,12 @@ from reconstruction.mapping.selection import Kind
 from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations
 from reconstruction.mapping.start import Start, at_once
-from reconstruction.settings import FIRST_LOOKS, MORE_MODES, Settings
+from reconstruction.settings import FIRST_LOOKS, Settings
 
 LATENCY = 90  # frames after which a map that another process makes is in force: three seconds of most videos
 FIRST_LATENCY = 0.25  # the same of a first model, of the frames it is made of: it takes a fraction of the time
 CATCH_UP, LIVE_CATCH_UP = 4, 2  # frames that get their shapes with each new one; live ones come on time meanwhile
 FEWEST = 10  # keyframes for a map
-FEW_ROUNDS = 24  # of learning on the way
 MORE = 2  # times as many keyframes of a solid at the end: what deforms must be seen from many sides
 FEWEST_POINTS = 4  # that a frame shows, for a first model
 GROWN = 1.3  # times as far apart as at the last map the keyframes are before there is another,
@@ -236,7 +235,7 @@ def on_the_way(settings: Settings, W: Array, visible: Mask, frames: Indices, *to
     found = map_of(W, visible, *told)
     if found is None or found.rest.kind != "rigid":
         return found
-    learned = with_deformations(found, settings, W, visible, frames, MORE_MODES, FEW_ROUNDS)
+    learned = with_deformations(found, settings, W, visible, frames, last=False)
     return replace(learned, deformations=None)
 
 

@@ -47,12 +47,14 @@ class Learned:
         state: pose and Λ' of the keyframes (n = K), their mean 0.
         deformations: the Gaussian.
         taken: how many parameters the image of a keyframe holds, on average.
+        unlikeliness: minus the log likelihood of an image point, in units of the model's size.
     """
 
     B: Array
     state: State
     deformations: Deformations
     taken: float = 0.0
+    unlikeliness: float = np.inf
 
 
 def going_with_turn(state: State) -> float:

@@ -12,17 +12,15 @@ from reconstruction.mapping.map import Map
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.deformations import Learned, going_with_turn
-from reconstruction.mapping.solid.deforming.learning import POINTS, RIGHTED, ROUNDS, learned
-from reconstruction.mapping.solid.deforming.own_motion import own_motion
-from reconstruction.mapping.solid.placing import well_spread
-from reconstruction.settings import MOST_MODES, Settings
-from reconstruction.state import State, join
-from reconstruction.window.energy import build_energy
+from reconstruction.mapping.solid.deforming.learning import RIGHTED, ROUNDS, learned
+from reconstruction.mapping.solid.deforming.starts import Start, begun, likeliest, modelled
+from reconstruction.settings import MORE_MODES, MOST_MODES, Settings
+from reconstruction.state import State
 from reconstruction.window.robust import lengths
 from reconstruction.window.statistics import residuals
-from reconstruction.window.window import SlidingWindow
 
 HIDDEN = 0.15  # of what keyframes show, to see whether it is predicted
+FEW_ROUNDS = 24  # of learning on the way
 TRIAL = RIGHTED  # rounds after which that is plain, and poses are put right
 COMPARED = 0.75  # quantile of what most of it does
 DRIFT = 0.017  # of the size, RMS: tracks of rigid things are off by up to 0.015, and points beside each other alike
@@ -35,8 +33,8 @@ def with_deformations(
     W: Array,
     visible: Mask,
     frames: Indices,
-    modes: int = MOST_MODES,
-    rounds: int = ROUNDS,
+    *,
+    last: bool = True,
 ) -> Map:
     """A solid's map with its deformations, if these predict what keyframes show in points that they are not learned from.
 
@@ -46,12 +44,12 @@ def with_deformations(
         W: (K, 2, p) px the keyframes; anything where not visible.
         visible: (K, p).
         frames: (K,) their numbers.
-        modes: so many, if that is not settled: 40 take a quarter of the time that 80 take, and what they leave over leads
-            astray in many rounds.
-        rounds: of expectation and maximisation.
+        last: whether there will be no other map, so that time may be spent on it. Else fewer modes, which take a quarter of
+            the time, in fewer rounds, since what they leave over leads astray in many; and poses stay what they are.
     """
     if settings.deformation not in ("auto", "general") or settings.priors.keys() & {"rest", "smoothness"}:
         return found
+    modes, rounds = (MOST_MODES, ROUNDS) if last else (MORE_MODES, FEW_ROUNDS)
     order = np.argsort(frames)
     W, visible = np.where(visible[:, None], W, 0.0)[order], visible[order]
     sound, rigid = without_outliers(W, visible), found.in_order(order)
@@ -61,20 +59,16 @@ def with_deformations(
         trial = learned(model, W, visible & ~hidden, first, first.log_s, TRIAL)
         if not predicted(model, W, hidden, trial, rigid):
             return found
+        start = Start(rigid, model, trial, first.log_s)
+        start = likeliest(start, settings, W, visible, sound) if last else start
+        model, trial = start.model, start.known
         latest = about(rigid, model, trial)  # whose poses tell better what moves together
         again = modelled(latest, settings, W, sound, modes)
-        log_s = first.log_s + np.log(model.scale / again.scale)  # else each start would let them go further
+        log_s = start.log_s + np.log(model.scale / again.scale)  # else each start would let them go further
         latest = about(latest, again, learned(again, W, visible, carried(model, trial, again), log_s, rounds))
     except np.linalg.LinAlgError:  # of points that lie as none do
         return found
     return latest.in_order(np.argsort(order))
-
-
-def modelled(found: Map, settings: Settings, W: Array, sound: Mask, modes: int = MOST_MODES) -> Model:
-    """Modes by what moves together, for keyframes in their order; arguments as for `begun`."""
-    motion = found.rest.motion
-    apart = own_motion((seen_by(found.camera, motion) - W) / motion.s[:, None, None], sound)
-    return replace(found, modes=modes, model=None).modelled(settings, own_motion=apart)
 
 
 def carried(model: Model, known: Learned, again: Model) -> State:
@@ -88,32 +82,6 @@ def carried(model: Model, known: Learned, again: Model) -> State:
         state.log_s + np.log(model.scale / again.scale),
         deformed @ np.linalg.pinv(again.B[3:-1]),
     )
-
-
-def begun(
-    found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask, modes: int = MOST_MODES
-) -> tuple[Model, State]:
-    """Modes by what moves together, and pose and Λ' of each keyframe by itself.
-
-    Args:
-        found: the map of keyframes, in their order.
-        settings: how to reconstruct.
-        W: (K, 2, p) px; finite.
-        visible: (K, p).
-        sound: (K, p) of that, what is not grossly wrong.
-        modes: as for `with_deformations`.
-    """
-    motion, model = found.rest.motion, modelled(found, settings, W, sound, modes)
-    some = well_spread(model.B[:3], visible, POINTS)
-    few = model.of_points(some)
-    energy = build_energy(few, "general", settings.priors)
-    window = SlidingWindow(few, energy, settings.window, replace(motion, shape=motion.shape[:, some]))
-    states = []
-    for one, seen in zip(W[:, :, some], visible[:, some], strict=True):
-        window.advance(one, seen)
-        assert window.state is not None
-        states.append(window.state[-1:])
-    return model, join(states)
 
 
 def predicted(model: Model, W: Array, hidden: Mask, known: Learned, rigid: Map) -> bool:

@@ -26,7 +26,9 @@ RIGHTED = 4  # the round after which poses are put right
 POINTS = 400  # by which it is learned: dense ones are placed afterwards
 
 
-def learned(model: Model, W: Array, visible: Mask, state: State, log_s: Array, rounds: int = ROUNDS) -> Learned:
+def learned(
+    model: Model, W: Array, visible: Mask, state: State, log_s: Array, rounds: int = ROUNDS, points: int = POINTS
+) -> Learned:
     """The Gaussian, and the rest shape about which it is, from where the keyframes were found to be so far.
 
     Args:
@@ -36,11 +38,12 @@ def learned(model: Model, W: Array, visible: Mask, state: State, log_s: Array, r
         state: pose and Λ' of each (n = K).
         log_s: (K,) to which scales are held.
         rounds: of expectation and maximisation.
+        points: at most, by which it is learned.
 
     Raises:
         LinAlgError: no Gaussian holds the points.
     """
-    seen, some = model.normalised(W), well_spread(model.B[:3], visible, POINTS)
+    seen, some = model.normalised(W), well_spread(model.B[:3], visible, points)
     learning = Rounds(model, some, seen[:, :, some], visible[:, some], log_s)
     path = [learning.begun(model.B, state)]
     for k in range(1, rounds + 1):
@@ -56,4 +59,4 @@ def learned(model: Model, W: Array, visible: Mask, state: State, log_s: Array, r
         h = visible * robust(found.deformations.noise).weight((off**2).sum(axis=1))
         B[:3] += shifts(seen, off, h, found.state, model.focal)
     B[:3] = without_new_spikes(B[:3], model.B[:3], visible)
-    return replace(found, B=B)
+    return replace(found, B=B, unlikeliness=learning.unlikeliness(found))

@@ -90,6 +90,14 @@ class Rounds:
         scales = ((state.log_s - self._log_s[frames]) / SCALE) ** 2
         return state, images + ((Lambda @ precision * Lambda).sum(axis=1) + scales) / 2
 
+    def unlikeliness(self, known: Learned) -> float:
+        """Minus the log likelihood of the images, whatever Λ' is, over how many points they show (Laplace's way)."""
+        every, covariance, noise = slice(None), known.deformations.covariance, known.deformations.noise
+        H = self._normal(known, inverted(covariance), self._left_over(known, every)[2], every)[0]
+        at_best = self.settled(known, every, 0)[1].sum()
+        volumes = np.linalg.slogdet(H)[1].sum() + len(H) * np.linalg.slogdet(covariance)[1]
+        return float((at_best + volumes / 2) / self._visible.sum() + 2 * np.log(noise))
+
     def _left_over(self, known: Learned, frames: slice) -> tuple[Array, Array, Array]:
         """Residuals (n, 2, p) of the frames that `known` has, their squared lengths (n, p), and robust weights (n, p)."""
         off = residuals(known.B[:, self._some], self._seen[frames], known.state.matrices(), self._focal)

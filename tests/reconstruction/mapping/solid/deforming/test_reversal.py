@@ -13,10 +13,11 @@ from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.deforming import learning
 from reconstruction.mapping.solid.deforming import rounds as em
-from reconstruction.mapping.solid.deforming.learned_map import about, carried, modelled
+from reconstruction.mapping.solid.deforming.learned_map import about, carried
 from reconstruction.mapping.solid.deforming.learning import learned
 from reconstruction.mapping.solid.deforming.reversal import in_reverse, righted
 from reconstruction.mapping.solid.deforming.rounds import Rounds
+from reconstruction.mapping.solid.deforming.starts import modelled
 from reconstruction.settings import Settings
 from reconstruction.state import State
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, seen
