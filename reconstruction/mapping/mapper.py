@@ -83,6 +83,7 @@ class Mapper:
         self._first_job: Job | None = None
         self._map_job: Job | None = None
         self._found: Map | None = None  # the last map
+        self._final: Map | None = None  # the one of all frames
         self._begin: tuple[Array, Mask] | None = None  # the first frame
         self._known: Array | None = None  # the rest shape of the newest model
         self._version, self._extent = 0, 0.0  # of the keyframes when they were last looked at
@@ -112,7 +113,7 @@ class Mapper:
         return self._in_force(begin)
 
     def finish(self, camera: Camera) -> Map | None:
-        """The model of fewer first frames than are wanted, since no more come; None if there was one, or no frame.
+        """The model of fewer frames than first ones are wanted, since no more come; None if there was one, or no frame.
 
         Raises:
             ReconstructionError: no rest shape can be had from them.
@@ -121,8 +122,8 @@ class Mapper:
             return None
         self.first_frames = max(self.first_frames, len(self._first))
         W, visible = stacked(self._first)
-        begun = self._first_job.future.result() if self._first_job else None
-        found = begun or bootstrap(W, visible, camera, self._settings, last=True)
+        found = self.final(camera, self._first) or (self._first_job and self._first_job.future.result())
+        found = found or bootstrap(W, visible, camera, self._settings, True)
         return found and self._taken(found, self._begin or (W[0], visible[0]))
 
     def final(self, camera: Camera, frames: Iterable[tuple[Array, Mask]]) -> Map | None:
@@ -132,14 +133,15 @@ class Mapper:
             camera: as for `add`.
             frames: all of them once more, points (2, p) px and visible (p,); they are read if it is a solid.
         """
-        if self._keyframes is None or not self._keyframes.frames:
-            return None
+        if self._final or self._keyframes is None or not self._keyframes.frames:
+            return self._final
         (W, visible, _), more = self._keyframes.spread(), cache(lambda: spread_of(frames, MORE * KEYFRAMES))
         found = map_of(W, visible, *self._told(camera, self.start), last=lambda: more()[:2])
         if found is not None and found.rest.kind == "rigid":
             found = with_deformations(found, self._settings, *more())
         found = found or self._found
-        return found and self._begin and nearest_first(found, *self._begin)
+        self._final = found and self._begin and nearest_first(found, *self._begin)
+        return self._final
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
         """Begin a first model, if it is time; at last by keyframes, where nothing goes on meanwhile.

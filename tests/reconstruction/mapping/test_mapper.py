@@ -154,6 +154,33 @@ def test_the_final_map_is_of_more_keyframes() -> None:
     assert len(found.rest.motion.s) == MORE * KEYFRAMES
 
 
+@pytest.mark.parametrize("latency", [0, LATENCY])
+@pytest.mark.parametrize("told", [True, False])
+def test_what_ends_early_has_the_map_of_all_its_keyframes(
+    latency: int,
+    told: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Once made, it is the final one, too; and a guess if keyframes do not tell."""
+    made: list[int] = []
+
+    def once(W: np.ndarray, *_: object, last: object = None) -> Map | None:
+        made.append(len(W))
+        flat = replace(model(len(W)).rest, kind="plane")
+        return replace(model(len(W)), rest=flat, seen=np.ones((len(W), POINTS), bool)) if told and last else None
+
+    monkeypatch.setattr(mapper, "map_of", once)
+    used, frames = Mapper(Settings(), at_once, latency=latency), FIRST_LOOKS[-1] - 5
+    assert adopted(used, range(frames)) == []
+    found = used.finish(CAMERA)
+    assert found is not None
+    assert (found.seen is not None) == told
+    assert used.finish(CAMERA) is None
+    if told:
+        assert used.final(CAMERA, []) is not None
+        assert made == [KEYFRAMES]
+
+
 def test_what_goes_wrong_is_raised_with_the_result() -> None:
     def fails() -> None:
         raise ValueError("no")
