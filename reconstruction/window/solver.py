@@ -52,8 +52,9 @@ def minimise(energy: Energy, data: Statistics, start: State, before: Previous | 
     value = normal.value
     while steps < solver.iterations:
         steps += 1
-        trial = energy.completed(state.moved(damped_step(normal, damping), energy.rows))
-        tried = evaluate(energy, data, trial, before)
+        with np.errstate(over="ignore", invalid="ignore"):  # of steps too far, which are not taken
+            trial = energy.completed(state.moved(damped_step(normal, damping), energy.rows))
+            tried = evaluate(energy, data, trial, before)
         gain = value.sum() - tried.sum()
         if not gain > 0:  # also when not finite
             if damping > 1e8 or abs(gain) <= 1e-14 * value.sum():

@@ -10,6 +10,7 @@ from scipy.linalg import LinAlgError
 
 from reconstruction.camera import Camera, quaternion_exp, quaternion_from_rotation, quaternion_product
 from reconstruction.state import State
+from reconstruction.window import solver
 from reconstruction.window.energy import Energy
 from reconstruction.window.solver import Solver, banded, minimise, solve_banded
 from reconstruction.window.terms import evaluate
@@ -115,6 +116,16 @@ def test_a_start_that_is_not_finite_ends() -> None:
     _, data, true, _ = scene(rng, Camera())
     broken = replace(true, t=np.full_like(true.t, np.nan))
     assert minimise(Energy(), data, broken, None, Solver()).steps <= Solver().iterations
+
+
+@pytest.mark.filterwarnings("error")
+def test_steps_too_far_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(2)
+    _, data, true, _ = scene(rng, Camera(500.0, np.array([320.0, 240.0])))
+    start, real = disturbed(rng, true), solver.damped_step
+    monkeypatch.setattr(solver, "damped_step", lambda normal, damping: real(normal, damping) + 1e4 * (damping < 1.0))
+    end = minimise(Energy(), data, start, None, Solver())
+    assert end.value.sum() < evaluate(Energy(), data, start, None).sum()
 
 
 @pytest.mark.parametrize("rows", [(2,), (0, 1)])
