@@ -22,6 +22,7 @@ SWEEPS = 20  # of filling gaps by the factors, and making these
 CLOSE = 3.0  # deviations up to which points count nearly alike, at last
 SHRINKING = 0.7  # times as many from one sweep to the next
 STEPS = 100  # of the metric upgrade, at most
+NOWHERE = 100.0  # times as far from the middle as is usual
 ALTERNATIONS = 5  # between the mean shape and its scales
 
 
@@ -37,7 +38,7 @@ def posed(W: Array, visible: Mask, rigid: Bundle, shapes: int, far: float) -> Ri
         far: as for `without_gaps`.
 
     Raises:
-        LinAlgError: of points that lie as none do, or seen as from nowhere.
+        LinAlgError: nothing rigid looks like that.
     """
     some, m = well_spread(rigid.motion.shape, visible, POINTS), rigid.motion
     depth = 1 + rigid.kappa * m.s[:, None] * (m.R[:, 2] @ m.shape)  # over the middle's
@@ -53,8 +54,9 @@ def posed(W: Array, visible: Mask, rigid: Bundle, shapes: int, far: float) -> Ri
         shape = np.linalg.lstsq(A, centred.reshape(len(A), -1), rcond=None)[0]
         image = R[:, :2] @ shape
         s = (image * centred).sum(axis=(1, 2)) / (image**2).sum(axis=(1, 2))
-    if s.min() <= 0:
-        raise np.linalg.LinAlgError("poses that mirror a keyframe")
+    distance = np.linalg.norm(shape, axis=0)
+    if s.min() <= 0 or not distance.max() < NOWHERE * np.median(distance):  # also what is not finite
+        raise np.linalg.LinAlgError("no shape for these keyframes")
     whole = m.shape.copy()
     whole[:, some] = s[0] * shape
     others = np.ones(whole.shape[1], np.bool_)

@@ -48,9 +48,9 @@ class Start:
 
 
 def likeliest(start: Start, settings: Settings, W: Array, visible: Mask, sound: Mask) -> Start:
-    """The same, or one by poses of its own (`low_rank`), if these make much likelier what keyframes show.
+    """The same, or one about another mean shape (`low_rank`), if that makes much likelier what keyframes show.
 
-    All are compared by few modes and few points: arguments as for `begun`.
+    All are compared by few modes and few points; arguments as for `begun`.
     """
     camera, motion = start.found.camera, start.found.rest.motion
     rigid, off = Bundle(motion, 1 / camera.focal_px), W - camera.center_px[:, None]
@@ -60,13 +60,14 @@ def likeliest(start: Start, settings: Settings, W: Array, visible: Mask, sound: 
         model, first = begun(found, settings, W, visible, sound, USUAL_MODES, FEW_POINTS)
         return Start(found, model, learned(model, W, visible, first, first.log_s, ROUNDS, FEW_POINTS), first.log_s)
 
-    limit, best = begun_by(motion).unlikeliness - LIKELIER, start
-    for start_of in STARTS:
-        with suppress(np.linalg.LinAlgError):  # of poses with which no Gaussian holds the points
-            other = begun_by(posed(off, visible, rigid, *start_of))
-            if other.unlikeliness < limit:
-                limit, best = other.unlikeliness, other
-    return best
+    with suppress(np.linalg.LinAlgError):  # where no Gaussian holds the points
+        limit = begun_by(motion).unlikeliness - LIKELIER
+        for one in STARTS:
+            with suppress(np.linalg.LinAlgError):
+                other = begun_by(posed(off, visible, rigid, *one))
+                if other.unlikeliness < limit:
+                    limit, start = other.unlikeliness, other
+    return start
 
 
 def modelled(found: Map, settings: Settings, W: Array, sound: Mask, modes: int = MOST_MODES) -> Model:
