@@ -71,7 +71,7 @@ def test_sheets_that_are_never_flat(modeshape: Command, shared_data: Path, file:
     words = json.loads(outcome.out)
     assert words["rest_shape"] == "isometric"
     assert words["e3d"] <= bound
-    assert words["e3d_online"] > words["e3d"]
+    assert words["e3d_online"] >= words["e3d"]  # the same where they end before first frames have told
 
 
 @pytest.mark.slow
