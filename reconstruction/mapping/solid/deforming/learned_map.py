@@ -45,7 +45,7 @@ def with_deformations(
         visible: (K, p).
         frames: (K,) their numbers.
         last: whether there will be no other map, so that time may be spent on it. Else fewer modes, which take a quarter of
-            the time, in fewer rounds, since what they leave over leads astray in many; and poses stay what they are.
+            the time, in fewer rounds, since what they leave over leads astray in many, from the rigid shape alone.
     """
     if settings.deformation not in ("auto", "general") or settings.priors.keys() & {"rest", "smoothness"}:
         return found
@@ -59,8 +59,8 @@ def with_deformations(
         trial = learned(model, W, visible & ~hidden, first, first.log_s, TRIAL)
         if not predicted(model, W, hidden, trial, rigid):
             return found
-        start = Start(rigid, model, trial, first.log_s)
-        start = likeliest(start, settings, W, visible, sound) if last else start
+        start = Start(model, trial, first.log_s)
+        start = likeliest(start, rigid, settings, W, visible, sound) if last else start
         model, trial = start.model, start.known
         latest = about(rigid, model, trial)  # whose poses tell better what moves together
         again = modelled(latest, settings, W, sound, modes)

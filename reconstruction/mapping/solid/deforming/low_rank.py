@@ -5,6 +5,8 @@ deformations. Images of K shapes, mixed anew in each, have rank 3K (Bregler, Her
 camera and deformation part where three columns of their motion make all rows orthogonal and equally long (Brand 2005).
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -13,11 +15,10 @@ from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import nearest_rotation
 from reconstruction.mapping.factorization import rotations_from_rows
 from reconstruction.mapping.solid.bundle import Bundle
+from reconstruction.mapping.solid.deforming.learning import POINTS
 from reconstruction.mapping.solid.placing import located, well_spread
 from reconstruction.window.robust import deviation, fit_weights, lengths
 
-POINTS = 400  # at most, that poses are found by
-MIRROR = np.array([1.0, 1.0, -1.0])
 SWEEPS = 20  # of filling gaps by the factors, and making these
 CLOSE = 3.0  # deviations up to which points count nearly alike, at last
 SHRINKING = 0.7  # times as many from one sweep to the next
@@ -47,7 +48,6 @@ def posed(W: Array, visible: Mask, rigid: Bundle, shapes: int, far: float) -> Ri
     t = filled.mean(axis=2)
     centred = filled - t[:, :, None]
     R = rotations_from_rows(metric(centred, 3 * shapes))
-    R = max((R, R * MIRROR * MIRROR[:, None]), key=lambda one: alike(one, m.R))
     s = m.s
     for _ in range(ALTERNATIONS):
         A = (s[:, None, None] * R[:, :2]).reshape(-1, 3)
@@ -57,11 +57,13 @@ def posed(W: Array, visible: Mask, rigid: Bundle, shapes: int, far: float) -> Ri
     distance = np.linalg.norm(shape, axis=0)
     if s.min() <= 0 or not distance.max() < NOWHERE * np.median(distance):  # also what is not finite
         raise np.linalg.LinAlgError("no shape for these keyframes")
+    found = RigidMotion(s[0] * shape, R, s / s[0], t)
+    found = max((found, found.mirrored()), key=lambda one: alike(one.R, m.R))
     whole = m.shape.copy()
-    whole[:, some] = s[0] * shape
+    whole[:, some] = found.shape
     others = np.ones(whole.shape[1], np.bool_)
     others[some] = False
-    known = Bundle(RigidMotion(whole, R, s / s[0], t), rigid.kappa)
+    known = Bundle(replace(found, shape=whole), rigid.kappa)
     return (located(W, visible.astype(np.float64), known, others, flat=False) if others.any() else known).motion
 
 

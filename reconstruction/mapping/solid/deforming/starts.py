@@ -30,13 +30,11 @@ class Start:
     """Where learning begins.
 
     Attributes:
-        found: the map, its poses those of a mean shape.
-        model: its modes.
+        model: a mean shape with its modes.
         known: what keyframes tell with them.
         log_s: (K,) to which scales are held.
     """
 
-    found: Map
     model: Model
     known: Learned
     log_s: Array
@@ -47,24 +45,24 @@ class Start:
         return self.known.unlikeliness + 2 * float(np.log(self.model.radius_px))
 
 
-def likeliest(start: Start, settings: Settings, W: Array, visible: Mask, sound: Mask) -> Start:
+def likeliest(start: Start, rigid: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) -> Start:
     """The same, or one about another mean shape (`low_rank`), if that makes much likelier what keyframes show.
 
-    All are compared by few modes and few points; arguments as for `begun`.
+    All are compared by few modes and few points; the rigid map and other arguments as for `begun`.
     """
-    camera, motion = start.found.camera, start.found.rest.motion
-    rigid, off = Bundle(motion, 1 / camera.focal_px), W - camera.center_px[:, None]
+    motion, camera = rigid.rest.motion, rigid.camera
+    bundle, off = Bundle(motion, 1 / camera.focal_px), W - camera.center_px[:, None]
 
     def begun_by(motion: RigidMotion) -> Start:
-        found = replace(start.found, rest=replace(start.found.rest, motion=motion), model=None)
+        found = replace(rigid, rest=replace(rigid.rest, motion=motion), model=None)
         model, first = begun(found, settings, W, visible, sound, USUAL_MODES, FEW_POINTS)
-        return Start(found, model, learned(model, W, visible, first, first.log_s, ROUNDS, FEW_POINTS), first.log_s)
+        return Start(model, learned(model, W, visible, first, first.log_s, ROUNDS, FEW_POINTS), first.log_s)
 
     with suppress(np.linalg.LinAlgError):  # where no Gaussian holds the points
         limit = begun_by(motion).unlikeliness - LIKELIER
         for one in STARTS:
             with suppress(np.linalg.LinAlgError):
-                other = begun_by(posed(off, visible, rigid, *one))
+                other = begun_by(posed(off, visible, bundle, *one))
                 if other.unlikeliness < limit:
                     limit, start = other.unlikeliness, other
     return start

@@ -17,7 +17,6 @@ from reconstruction.settings import Settings
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, seen, turns
 
 K, P = 30, 80
-ARMS = 0.5, 1.9  # radians they swing by
 FIRST_ARM, SECOND_ARM = 1, 2  # of every four points
 
 
@@ -90,8 +89,8 @@ def test_poses_are_believed_if_they_make_images_likelier(swing: float, better: b
     _, shapes, W, visible = person(PERSPECTIVE, swing)
     found = rigid(W, visible, PERSPECTIVE)
     model, first = begun(found, Settings(), W, visible, visible, 20)
-    start = Start(found, model, learned(model, W, visible, first, first.log_s), first.log_s)
-    other = likeliest(start, Settings(), W, visible, visible)
+    start = Start(model, learned(model, W, visible, first, first.log_s), first.log_s)
+    other = likeliest(start, found, Settings(), W, visible, visible)
     assert (other is not start) == better
     if better:
         errors = []
