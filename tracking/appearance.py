@@ -128,6 +128,10 @@ class Appearance:
         normal[:, (0, 1), (0, 1)] += 1e-3 * np.trace(normal, axis1=1, axis2=2)[:, None] + 1e-9
         self._templates[which], self._inverse[which] = templates, np.linalg.inv(normal)
 
+    def clarity(self, which: Indices) -> Array:
+        """How sharp the patches of the points `which` (n,) are along the direction in which they are least: (n,)."""
+        return np.asarray(1.0 / np.linalg.eigvalsh(self._inverse[which])[:, -1])
+
     def align(self, image: Floats, points_px: Array, affine: Array, which: Indices, iterations: int) -> Alignment:
         """Move the points `which` to where the picture looks most like their patches.
 

@@ -82,8 +82,8 @@ class GuardedTracker:
     """
 
     def __init__(self, image_bgr: Image, points_px: Array) -> None:
-        self._reference = self._image = image_bgr  # the first, until it is described, and the last that showed the surface
-        self._points = points_px
+        self._reference = self._image = image_bgr  # until it is described, and the last that showed the surface
+        self._points = self._reference_px = points_px
         self._tracker = PointTracker(image_bgr, points_px)
         self._left_behind = LeftBehind(points_px)
         self._relocalisation: Relocalisation | Future[Relocalisation] | None = None
@@ -114,6 +114,8 @@ class GuardedTracker:
         self._image = image_bgr
         seen = observation.visible[:, None]
         self._last_px = np.where(seen, observation.points_px, expected_px)
+        if observation.renewed and np.isfinite(self._last_px).all():
+            self._reference, self._reference_px, self._relocalisation = image_bgr, self._last_px, None
         behind = self._left_behind.look(observation)
         if not behind:
             return Guarded(observation)
@@ -175,7 +177,7 @@ class GuardedTracker:
         """Begin to describe the surface by its features, in a thread: it takes longer than a frame."""
         if self._relocalisation is None:
             pool = ThreadPoolExecutor(1)  # OpenCV holds no lock of the interpreter's
-            self._relocalisation = pool.submit(Relocalisation, self._reference, self._points)
+            self._relocalisation = pool.submit(Relocalisation, self._reference, self._reference_px)
             pool.shutdown(wait=False)
             self._reference = self._reference[:0].copy()  # what is kept for long keeps no pictures
 

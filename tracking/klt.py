@@ -1,17 +1,16 @@
 """The point tracker: pyramidal Lucas-Kanade checked by appearance and neighbours, and re-acquisition."""
 
-from copy import deepcopy
+from dataclasses import replace
 
-import cv2
 import numpy as np
 
 from tracking import Array, Flags, Floats, Image, Indices
-from tracking.appearance import Appearance, Fusion
+from tracking.appearance import Fusion
 from tracking.consistency import MIN_SUPPORT, LocalMotion, Surroundings
 from tracking.flow import Flow, Grays
+from tracking.looks import Looks, pictures_of
 from tracking.observation import Observation
 
-PATCH_RADIUS = 7
 BORDER_PX = 4.0  # nearer to the border a point counts as having left
 # Correlations with the reference. Measured on kinect_paper at true places (median, worst 2 %), in the fine
 # and the half picture: 0.93, 0.84 and 0.96, 0.90; under 8 px of motion blur 0.67, 0.33 and 0.84, 0.67; of other
@@ -44,9 +43,7 @@ class PointTracker:
         self._reference = points_px.astype(np.float64)
         self._flow = Flow(self._reference)
         self._surroundings = Surroundings(self._reference)
-        pictures = _pictures(self._grays)
-        self._levels = [Appearance(picture, self._reference / 2.0**k, PATCH_RADIUS) for k, picture in enumerate(pictures)]
-        self._recent = deepcopy(self._levels[0])  # as points were when last surely placed
+        self._looks = Looks(pictures_of(self._grays), self._reference)
         self._sure = np.zeros(len(points_px), np.bool_)  # surely placed in the last picture
         self._points = self._reference.copy()
         self._affine = np.broadcast_to(np.eye(2), (len(points_px), 2, 2)).copy()
@@ -67,7 +64,7 @@ class PointTracker:
                 are taken up again near there. None while there is no model: they are where their neighbours went.
         """
         grays = Grays.of(image_bgr)
-        pictures = _pictures(grays)
+        pictures = pictures_of(grays)
         points = self._flow.follow(self._grays, grays, self._points)
         motion = self._motion(points, predicted_px)
         points[~motion.consistent] = np.nan
@@ -75,7 +72,8 @@ class PointTracker:
         self._counts += np.isfinite(points[:, 0]).sum(), alike
         points = self._retrieve(pictures, points, self._expected(points, motion, predicted_px), motion)
         self._grays = grays
-        return self._observation(points, motion)
+        seen = self._observation(points, motion)
+        return replace(seen, renewed=self._looks.renewed(pictures, self._points, self._affine, seen.visible))
 
     def resume(self, image_bgr: Image, expected_px: Array) -> Observation:
         """Find the points in a frame from their rough places alone, and go on from there.
@@ -95,7 +93,7 @@ class PointTracker:
         Args:
             expected_px: (P, 2) where the points are, to some pixels; NaN where that is not known.
         """
-        pictures = _pictures(self._grays)
+        pictures = pictures_of(self._grays)
         points = self._points
         for _ in range(RESUME_ROUNDS):  # what is found tells better where the others are
             sought = np.where(np.isfinite(points), points, expected_px + self._miss(points, expected_px))
@@ -123,7 +121,7 @@ class PointTracker:
         """Remove the drift of tracked points; drop those that look different. And how many look as in the reference."""
         points = points.copy()
         seen = np.flatnonzero(np.isfinite(points[:, 0]))
-        fine = self._levels[0].align(pictures[0], points[seen], motion.affine[seen], seen, REFINE_STEPS)
+        fine = self._looks.levels[0].align(pictures[0], points[seen], motion.affine[seen], seen, REFINE_STEPS)
         clear = fine.score > CLEAR_SCORE
         sure = clear & (fine.sigma_px < SURE_PX)
         self._correct(points, seen[sure], fine.points_px[sure])
@@ -140,7 +138,7 @@ class PointTracker:
         # Without texture a patch says little, or only across an edge; larger ones and the neighbours say more.
         for level, least in ((1, BLURRED_SCORE), (2, CLEAR_SCORE)):
             scale = 2.0**level
-            found = self._levels[level].align(pictures[level], start / scale, affine, which, REFINE_STEPS)
+            found = self._looks.levels[level].align(pictures[level], start / scale, affine, which, REFINE_STEPS)
             if level == 1:
                 # A point that its neighbours do not check must look more alike.
                 keep = np.where(motion.support[which] >= MIN_SUPPORT, KEEP_SCORE, RETRIEVE_SCORE)
@@ -151,7 +149,7 @@ class PointTracker:
         # it. It is not learnt from where it was found so: errors do not add up. What is clear is left alone: the errors of
         # compression are those of the pictures just before, too.
         unlike = np.flatnonzero(~clear)
-        found = self._recent.align(pictures[0], start[unlike], affine[unlike], which[unlike], REFINE_STEPS)
+        found = self._looks.recent.align(pictures[0], start[unlike], affine[unlike], which[unlike], REFINE_STEPS)
         like = found.score > CLEAR_SCORE
         same[unlike] |= like
         good = like & _near(found.points_px, start[unlike])
@@ -170,7 +168,7 @@ class PointTracker:
         self._sure[sure] = True
         new = np.flatnonzero(before & ~self._sure)
         if len(new):
-            self._recent.learn(self._grays.full.astype(np.float32), self._points[new], self._affine[new], new)
+            self._looks.recent.learn(self._grays.full.astype(np.float32), self._points[new], self._affine[new], new)
 
     def _correct(self, points: Array, which: Indices, aligned: Array) -> None:
         """Move points in place to their aligned positions where these are near; NaN stays."""
@@ -210,8 +208,8 @@ class PointTracker:
         if len(sought) == 0:
             return points
         affine = motion.affine[sought]
-        rough = self._levels[1].align(pictures[1], expected[sought] / 2.0, affine, sought, RETRIEVE_STEPS)
-        found = self._levels[0].align(pictures[0], 2.0 * rough.points_px, affine, sought, RETRIEVE_STEPS)
+        rough = self._looks.levels[1].align(pictures[1], expected[sought] / 2.0, affine, sought, RETRIEVE_STEPS)
+        found = self._looks.levels[0].align(pictures[0], 2.0 * rough.points_px, affine, sought, RETRIEVE_STEPS)
         near = np.linalg.norm(found.points_px - expected[sought], axis=1) < RETRIEVE_PX
         good = near & (np.maximum(found.score, rough.score) > RETRIEVE_SCORE)
         points = points.copy()
@@ -231,8 +229,3 @@ def _inside(points: Array, shape: tuple[int, ...]) -> Flags:
     limit = np.array([shape[1], shape[0]]) - 1.0 - BORDER_PX
     inside = (points >= BORDER_PX) & (points <= limit)
     return inside[:, 0] & inside[:, 1]
-
-
-def _pictures(grays: Grays) -> list[Floats]:
-    """The picture, its half and its quarter, as float32."""
-    return [picture.astype(np.float32) for picture in (grays.full, grays.half, cv2.pyrDown(grays.half))]

@@ -9,6 +9,7 @@ from app.footage.camera import panned, rolled
 from app.footage.case import Case
 from app.footage.cover import crossing, time_code, title, watermark
 from app.footage.light import alternating, at_random, bands, fading_in
+from app.footage.sharpness import focusing, shaken_at_first
 from app.footage.storage import Storage
 from app.footage.surroundings import background
 
@@ -50,6 +51,8 @@ _CASES = (
       for degrees in (24, 50) for when, first in (("at the start", 0), ("later", 60))),
     Case("black at first", 2.6, before=black),
     Case("fading in", 2.6, (fading_in(30),)),
+    Case("shaken at first", 2.6, (shaken_at_first(16.0, 8),)),
+    Case("out of focus at first", 2.6, (focusing(3.0, 15),)),
     Case("a title card first", 2.6, before=titled),
     Case("an image missing", 2.6, storage=Storage(left_out=(50,))),
     Case("50 kbit/s", None, storage=Storage(bit_rate=50_000)),

@@ -16,6 +16,7 @@ from tracking.region.surface import FAR_ENOUGH, Surface, middling, surfaces
 from tracking.video import Frame
 
 MOST_FRAMES = 90  # are looked at
+LEAST_FRAMES = 6  # the same: a thing that rushes in is blurred, and one motion or two tell hardly what moves together
 MIDDLE = 0.5  # of a region that was drawn: nearer to its middle than to its border
 SEEN = 0.5  # of the points: fewer left say nothing of the others, or it is another picture
 CLEARER = 2.0  # times the contrast of the first frame: it was still fading in
@@ -87,7 +88,7 @@ class Search:
     @property
     def enough(self) -> bool:
         """Whether further frames would not tell more."""
-        return self.frames >= MOST_FRAMES or self._far(self._way)
+        return self.frames >= MOST_FRAMES or (self.frames >= LEAST_FRAMES and self._far(self._way))
 
     @property
     def faint(self) -> bool:
@@ -223,7 +224,8 @@ def search(frames: Iterable[Frame], region: Image) -> Found:
                 if begun[0].enough:
                     break
                 continue
-            if not same and begun[0].moved_px > 0.5 * FAR_ENOUGH * max(region.shape):
+            looked_at = begun[0].frames >= LEAST_FRAMES
+            if not same and looked_at and begun[0].moved_px > 0.5 * FAR_ENOUGH * max(region.shape):
                 break
             earlier, begun = farther(earlier, begun), None
         try:

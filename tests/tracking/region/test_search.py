@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from tests.tracking.scene import texture
 from tracking import TrackingError
 from tracking.features import detect_corners
-from tracking.region.search import MOST_FRAMES, Search, search
+from tracking.region.search import LEAST_FRAMES, MOST_FRAMES, Search, search
 from tracking.video import Frame, Video
 
 Image = NDArray[np.uint8]
@@ -127,6 +127,16 @@ def test_of_two_the_larger_that_moves_more_is_taken_and_the_other_named() -> Non
     assert 55 < y < 85
     assert 70 < w < 130
     assert 80 < h < 125
+
+
+def test_what_rushes_in_and_is_covered_at_once_tells_nothing() -> None:
+    """It moves enough within four frames, but one or two motions hardly tell what moves together."""
+    rushing = list(scene((20, 40, 130, 110, 200.0), frames=LEAST_FRAMES - 2))
+    then = scene((90, 60, 130, 110, 25.0), wall=texture(2))
+    found = search([*rushing, *(replace(frame, index=len(rushing) + frame.index) for frame in then)], WHOLE)
+    assert found.first.index == len(rushing)
+    assert found.frames > LEAST_FRAMES
+    assert overlap(found.region, 90, 60, 130, 110) > 0.75
 
 
 def test_a_still_scene_is_taken_whole() -> None:
