@@ -46,7 +46,7 @@ def test_the_surface_of_a_file_is_found_and_no_frame_from_there_on_is_missing(so
     x, y, w, h = cv2.boundingRect(look.region)
     assert (abs(x - 90) < 12, abs(y - 60) < 12, abs(w - 130) < 24, abs(h - 110) < 24) == (True,) * 4
     blank, found = look.notes
-    assert blank == f"nothing to follow in the first {BLACK} frames: begins with frame {BLACK}"
+    assert blank == f"the first {BLACK} frames show nothing to follow, or what is soon gone: begins with frame {BLACK}"
     assert f"--roi {x} {y} {w} {h}; choose by --roi X Y W H" in found
 
 
