@@ -108,7 +108,8 @@ def notes_on(found: Found, began: int) -> list[str]:
         began: number of the first frame looked at.
     """
     blank = found.first.index - began
-    notes = [f"the first {blank} frames show nothing to follow, or what is soon gone: begins with frame {found.first.index}"] if blank else []
+    past = f"the first {blank} frames show nothing to follow, or what is soon gone: begins with frame {found.first.index}"
+    notes = [past] if blank else []
     if found.surface is None:
         still = f"no surface is seen to move in {found.frames} frames: the whole region is taken; choose by --roi X Y W H"
         return [*notes, still]
