@@ -18,6 +18,8 @@ FAIR_ERROR, POOR_ERROR = 0.010, 0.018
 POOR_GUESS = 0.005
 # What is not seen is a guess by its neighbours.
 FAIR_SHARE, POOR_SHARE = 0.5, 0.3
+TOGETHER = 0.75  # of the points that a keyframe shows, with which another has been seen, or it may be on the far side
+COMPARED = 300  # points tell how much is hidden so
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 # What no longer looks as it did may have slid: along edges, with highlights and shades. Printed paper on bad days has up to
 # 5 %, real faces that speak 16 to 22 %; smooth drawn faces, where half of the points seen are 3 px off, from 50 % on.
@@ -74,20 +76,34 @@ def remedy(found: Map) -> str:
     return "more than one thing may move there; draw the region tightly: modeshape pick, --roi or --mask"
 
 
-def seen(course: Course) -> Iterator[Verdict]:
-    """What the share of points seen says."""
-    shares = np.asarray(course.shares)
+def seen(course: Course, found: Map) -> Iterator[Verdict]:
+    """What the share of points seen says, of those that may be seen at once."""
+    possible = at_once(found)
+    shares = np.asarray(course.shares) / possible
+    points = "points" if possible == 1 else "points on the near side"
     share = float(shares.mean())
     for grade, limit in limits(POOR_SHARE, FAIR_SHARE):
         few = np.asarray(shares < limit)
         if share < limit or longest(few)[1] > 2 * LASTING * len(few):
             first, length = longest(few)
             stretch = f"in frames {course.frames[first]} to {course.frames[first + length - 1]} " if length else ""
-            told = f"{stretch}less than {limit:.0%} of the points are seen; leave such frames out with --frames A:B"
+            told = f"{stretch}less than {limit:.0%} of the {points} are seen; leave such frames out with --frames A:B"
             yield Verdict(grade, told)
             return
     if course.lost > len(shares):
         yield Verdict("fair", "the surface is out of sight most of the time; choose its frames with --frames A:B")
+
+
+def at_once(found: Map) -> float:
+    """The share of a solid's points that a usual keyframe might show: of one that turns the far side is hidden.
+
+    Those that some keyframes show together with most of what this one shows; of points missing at random all are.
+    """
+    if found.seen is None or found.rest.kind != "rigid":
+        return 1.0
+    shown = found.seen[:, :: -(-found.seen.shape[1] // COMPARED)].astype(np.float64)
+    beside = shown @ (shown.T @ shown > 0) / shown.sum(axis=1, keepdims=True).clip(1)
+    return float(np.median((beside > TOGETHER).mean(axis=1)))
 
 
 def looks(alike: float) -> Iterator[Verdict]:

@@ -77,6 +77,16 @@ class Build:
         bundle = located(self.W, self.h, Bundle(replace(found.motion, shape=shape), self.kappa), ~often, flat=self.flat)
         return [bundle, bundle.reversed()] if self.kappa else [bundle]
 
+    def posed(self, shape: Array) -> Bundle:
+        """A shape (3, p) of any size, turned anyhow, where each view shows it, by robust affine resection."""
+        shape = shape - shape.mean(axis=1, keepdims=True)
+        R, s, t = self._resected(shape, 0, self.h[0] > 0)
+        start = RigidMotion(s * R @ shape, np.eye(3)[None], np.ones(1), t[None])
+        m = self.with_views(Bundle(start, self.kappa), len(self.W)).motion
+        for k in (1 + np.flatnonzero((self.h[1:] > 0).sum(axis=1) >= FEWEST_POINTS)).tolist():
+            m.R[k], m.s[k], m.t[k] = self._resected(m.shape, k, self.h[k] > 0)
+        return self.adjusted(Bundle(m, self.kappa), REPOSING)[0]
+
     def grown(self, start: RigidMotion) -> Bundle:
         """First the views most alike, then more and more, each placed by points that have been seen twice before it."""
         bundle = Bundle(start, self.kappa)
@@ -108,13 +118,10 @@ class Build:
         near = residual < REPOSED_SIGMAS * deviation(residual[seen], LEAST_TAIL / TAIL_SIGMAS)
         sound = near.sum(axis=0) > HARDLY * seen.sum(axis=0)
         R, s, t = m.R.copy(), m.s.copy(), m.t.copy()
-        for k in np.flatnonzero(near.sum(axis=1) < MOSTLY * seen.sum(axis=1)):
+        for k in np.flatnonzero(near.sum(axis=1) < MOSTLY * seen.sum(axis=1)).tolist():
             use = seen[k] & sound
             if use.sum() >= FEWEST_POINTS:
-                X, u = m.shape[:, use], self.W[k][:, use]
-                R[k], s[k] = resection(X, u, RESECTIONS)
-                Y = s[k] * R[k] @ X
-                t[k] = np.median(u * (1 + bundle.kappa * Y[2]) - Y[:2], axis=1)
+                R[k], s[k], t[k] = self._resected(m.shape, k, use)
         other, _ = self.adjusted(Bundle(RigidMotion(m.shape, R, s, t), bundle.kappa), REPOSING)
         better = medians(self.residual(other), axis=1) < MOSTLY * medians(residual, axis=1)
         R, s, t = (
@@ -122,6 +129,13 @@ class Build:
             for new, old in ((other.motion.R, m.R), (other.motion.s, m.s), (other.motion.t, m.t))
         )
         return Bundle(RigidMotion(m.shape, R, s, t), bundle.kappa)
+
+    def _resected(self, shape: Array, k: int, use: Mask) -> tuple[Array, float, Array]:
+        """Rotation (3, 3), scale and shift (2,) with which points `use` (p,) of a shape (3, p) look most like a view."""
+        X, u = shape[:, use], self.W[k][:, use]
+        R, s = resection(X, u, RESECTIONS)
+        Y = s * R @ X
+        return R, s, np.median(u * (1 + self.kappa * Y[2]) - Y[:2], axis=1)
 
     def completed(self, bundle: Bundle, points: Indices) -> Bundle:
         """A bundle of some points with all of them where its poses place them, each as well as it moves with the others.

@@ -10,7 +10,7 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.solid.adjustment import Adjustment
 from reconstruction.mapping.solid.building import Build
 from reconstruction.mapping.solid.bundle import Bundle
-from reconstruction.mapping.solid.placing import dome, placed_like, well_spread
+from reconstruction.mapping.solid.placing import dome, well_spread
 from reconstruction.mapping.solid.views import Likeness, building_order, completed
 
 REPOSINGS, ENOUGH = 5, 0.999  # rounds of posing views anew, while they lower the energy to less than so much of it
@@ -65,7 +65,7 @@ class Growth:
         build = self.chosen
         both_ways = build.factorized() if whole else []
         starts = [*both_ways, self.grown]
-        starts += [] if known is None else [build.grown(placed_like(build.first, known[:, self.some]))]
+        starts += [] if known is None else [build.posed(known[:, self.some])]
         found = [build.settled(one, refine=refine) for one in starts]
         k = int(np.argmin([energy for _, energy in found]))
         best, energy = found[k]

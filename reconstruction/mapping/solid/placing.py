@@ -39,13 +39,6 @@ def dome(first: Array, kappa: float, *, flat: bool) -> RigidMotion:
     return RigidMotion(np.concatenate([xy - t[:, None], z[None]]), np.eye(3)[None], np.ones(1), t[None])
 
 
-def placed_like(first: Array, shape: Array) -> RigidMotion:
-    """A shape (3, p) as large and turned as it looks most like the image (2, p)."""
-    R, s = resection(shape, first)
-    shape = shape - shape.mean(axis=1, keepdims=True)
-    return RigidMotion(s * R @ shape, np.eye(3)[None], np.ones(1), first.mean(axis=1)[None])
-
-
 def resection(shape: Array, image: Array, rounds: int = 1) -> tuple[Array, float]:
     """Rotation (3, 3) and scale with which a shape (3, n) looks most like an image (2, n), as if there were no perspective.
 
