@@ -112,7 +112,10 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     if sureness < PLAIN:
         rigid = both(rigid, rigid_by(views[1], views[0], camera, at))
         kind, sureness = decide(rigid, sheet, stretch, told_px)
-    return Evidence(rigid.flat, rigid.solid, rigid.turn_degrees, rigid.relief, kind, sheet, change, sureness, told_px)
+    shape = np.full((3, W.shape[2]), np.nan)
+    shape[:, few] = rigid.shape
+    turn, relief = rigid.turn_degrees, rigid.relief
+    return Evidence(rigid.flat, rigid.solid, turn, relief, kind, sheet, change, sureness, told_px, shape=shape)
 
 
 def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan) -> tuple[Kind, float]:

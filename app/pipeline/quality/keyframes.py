@@ -4,13 +4,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from app.arrays import Array
 from app.pipeline.quality.finding import Grade, Verdict
 from reconstruction.basis.rest_shape import RigidMotion, rms_radius
+from reconstruction.camera import nearest_rotation
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
 from reconstruction.mapping.selection import PLAIN, Evidence
 from reconstruction.mapping.solid.rivals import HARDLY_TURNED
-from reconstruction.mapping.solid.solid import relief
 
 FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
@@ -24,7 +25,7 @@ FAIR_CHANGE, POOR_CHANGE = 0.028, 0.04  # the same with noise, over the radius a
 FAR_TURNED = 90.0  # degrees: views of a solid that turns farther share few points
 WITH_TURN = 0.7  # share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
-OTHERWISE_DEEP = 1.6  # times the relief by half of the keyframes: solids that are, cans at most, have up to 1.4
+OTHERWISE = 0.15  # of its size, that half of the keyframes find a solid elsewhere: those that deform have up to 0.1
 FAIR_BY_FOCAL, POOR_BY_FOCAL = 0.02, 0.05  # of its size, that shapes may be off by a focal length that was looked for
 SURELY = 2.4  # sureness of a sheet that nothing turns: cloth that stretches has up to 2.1, rolled paper 2.7 and more
 MOSTLY = 2.4  # times what a solid leaves over a plane must: rigid ones, turned by 8°, have 2.9 and more, limbs up to 1.5
@@ -122,9 +123,9 @@ def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
         told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
         yield Verdict("poor" if whole > POOR_CHANGE else "fair", f"{told}; film it turning more")
     at_worst: Grade = "poor" if turn > FAR_TURNED else "fair"  # its sides may be put together wrongly
-    deep, half = relief(motion.shape), evidence.relief
-    if max(deep, half) > OTHERWISE_DEEP * min(deep, half):
-        told = f"as deep as {deep:.2f} of its width, by half of the keyframes {half:.2f}: depth is a guess"
+    off = 0.0 if evidence.shape is None else unlike(motion.shape, evidence.shape, mirrored=not found.camera.perspective)
+    if off > OTHERWISE:
+        told = f"half of the keyframes find it otherwise, by {off:.0%} of its size: how deep it is is a guess"
         yield Verdict(at_worst, f"{told}; film it turning more")
     if found.deformations is not None and found.deformations.turning > WITH_TURN:
         told = f"{found.deformations.turning:.0%} of its changes go with its turn: which is which is a guess"
@@ -132,6 +133,23 @@ def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
     if rare > MOST_RARE:
         yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
+
+
+def unlike(shape: Array, other: Array, *, mirrored: bool) -> float:
+    """How far off another shape is that is laid on a shape as well as it can be, RMS over the size.
+
+    Args:
+        shape: (3, p).
+        other: (3, p) of any size, turned anyhow; NaN where it is not known.
+        mirrored: whether its mirror image is as good.
+    """
+    known = np.isfinite(other).all(axis=0)
+    A, B = (X - X.mean(axis=1, keepdims=True) for X in (other[:, known], shape[:, known]))
+    flips = (1.0, -1.0) if mirrored else (1.0,)
+    products = [B @ (A * [[1.0], [1.0], [flip]]).T for flip in flips]
+    fit = max(float((nearest_rotation(M) * M).sum()) for M in products)
+    share = fit**2 / float((A**2).sum() * (B**2).sum())  # of its squares that the other explains
+    return float(np.sqrt(1 - min(share, 1.0)))
 
 
 def of_sheet(found: IsometricSheet, evidence: Evidence, *, perspective: bool) -> Iterator[Verdict]:

@@ -52,8 +52,9 @@ def adjust(W: Array, h: Array, bundle: Bundle, loss: Loss, prior: Prior, how: Ad
     for _ in range(how.steps):
         system = System(W, h, bundle, loss, prior)
         while damping < GIVING_UP:
-            tried = bundle.moved(*system.step_of(how, damping))
-            after = energy(W, h, tried, loss, prior)
+            with np.errstate(over="ignore", invalid="ignore"):  # of steps too far, which are not taken
+                tried = bundle.moved(*system.step_of(how, damping))
+                after = energy(W, h, tried, loss, prior)
             if after < value:
                 break
             damping *= 5

@@ -1,11 +1,12 @@
 """Rivals of a sheet: a plane and a solid made from some keyframes, and what they leave over on others."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
+from reconstruction.mapping.solid.placing import FEWEST_VIEWS
 from reconstruction.mapping.solid.seen_again import image_in
 from reconstruction.mapping.solid.solid import Solid, bundle_adjust
 
@@ -35,12 +36,14 @@ class Rigid:
     Attributes:
         flat, solid: what each leaves over.
         turn_degrees, relief: of the solid.
+        shape: (3, p) of the solid, of any size, NaN where too few of its keyframes show a point.
     """
 
     flat: Misfit
     solid: Misfit
     turn_degrees: float
     relief: float
+    shape: Array | None = field(default=None, kw_only=True)
 
     @property
     def proven(self) -> bool:
@@ -53,7 +56,8 @@ def rigid_by(made: tuple[Array, Mask], tested: tuple[Array, Mask], camera: Camer
     """A plane and a solid made from some keyframes, on others."""
     solid, flat = (bundle_adjust(*made, camera, refine_focal=False, flat=flat) for flat in (False, True))
     left = [rigid_misfit(model, *tested, camera, edges) for model in (flat, solid)]
-    return Rigid(left[0], left[1], solid.turn_degrees, solid.relief)
+    shape = np.where(made[1].sum(axis=0) < FEWEST_VIEWS, np.nan, solid.shape)
+    return Rigid(left[0], left[1], solid.turn_degrees, solid.relief, shape=shape)
 
 
 def rigid_misfit(model: Solid, W: Array, visible: Mask, camera: Camera, edges: Indices) -> Misfit:
@@ -71,7 +75,7 @@ def both(one: Rigid, other: Rigid) -> Rigid:
         Misfit(rms([a.edges_px, b.edges_px]), rms([a.whole_px, b.whole_px]))
         for a, b in ((one.flat, other.flat), (one.solid, other.solid))
     )
-    return Rigid(flat, solid, (one.turn_degrees + other.turn_degrees) / 2, (one.relief + other.relief) / 2)
+    return Rigid(flat, solid, (one.turn_degrees + other.turn_degrees) / 2, (one.relief + other.relief) / 2, shape=one.shape)
 
 
 def rms(values: list[float]) -> float:

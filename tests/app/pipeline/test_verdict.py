@@ -125,12 +125,32 @@ def test_the_depth_of_a_solid_that_changes(whole_px: float, edges_px: float, tur
 
 
 @pytest.mark.parametrize(("turn_degrees", "grade"), [(30.0, "fair"), (150.0, "poor")])
-@pytest.mark.parametrize("factor", [0.5, 2.0])
-def test_a_solid_that_half_of_the_keyframes_find_otherwise_deep(factor: float, turn_degrees: float, grade: str) -> None:
-    half = replace(EVIDENCE, relief=factor * EVIDENCE.relief, turn_degrees=turn_degrees)
-    said = verdict(course([0.001] * 50), replace(SOLID, evidence=half))
+@pytest.mark.parametrize("factor", [0.5, 2.0, -1.0])
+def test_a_solid_that_half_of_the_keyframes_find_otherwise(factor: float, turn_degrees: float, grade: str) -> None:
+    lump = np.random.default_rng(0).normal(size=(3, 40))
+    solid = replace(SOLID, rest=replace(REST, motion=replace(REST.motion, shape=100 * lump)), camera=Camera(500.0))
+    turned = 3 * np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]) @ lump
+    turned[:, :5] = np.nan
+    half = replace(EVIDENCE, turn_degrees=turn_degrees, shape=turned)
+    assert verdict(course([0.001] * 50), replace(solid, evidence=half)).grade == "good"
+    half = replace(half, shape=turned * [[1.0], [1.0], [factor]])
+    said = verdict(course([0.001] * 50), replace(solid, evidence=half))
     assert said.grade == grade
-    assert "depth is a guess" in said.reason
+    assert "how deep it is is a guess" in said.reason
+    distant = verdict(course([0.001] * 50), replace(solid, camera=Camera(), evidence=half))
+    assert (distant.grade == "good") is (factor == -1.0)  # without perspective its mirror image is as good
+
+
+def test_what_a_solid_hides_of_itself_is_not_held_against_it() -> None:
+    """Forty points around it, of which each keyframe shows the nearest sixteen."""
+    around, views = np.arange(40) * 9.0, np.arange(60) * 6.0
+    shown = np.abs((around - views[:, None] + 180.0) % 360.0 - 180.0) < 70.0
+    turning, share = replace(SOLID, seen=shown), float(shown.mean())
+    assert 0.35 < share < 0.42
+    assert verdict(course([0.001] * 50, share), turning).grade == "good"
+    assert "near side" in verdict(course([0.001] * 50, 0.2), turning).reason
+    some = replace(SOLID, seen=np.random.default_rng(0).random(shown.shape) < share)
+    assert verdict(course([0.001] * 50, share), some).grade == "fair"
 
 
 def test_what_deforms_may_seem_to_turn() -> None:

@@ -9,8 +9,10 @@ from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaterni
 from reconstruction.mapping.solid.adjustment import Adjustment
 from reconstruction.mapping.solid.building import Build
 from reconstruction.mapping.solid.bundle import Bundle
+from reconstruction.mapping.solid.growth import growth_from
 from reconstruction.mapping.solid.placing import located
 from reconstruction.mapping.solid.solid import bundle_adjust
+from reconstruction.mapping.solid.views import likeness
 from tests.reconstruction.world import CAMERAS, ORTHOGRAPHIC, PERSPECTIVE, SEEDS, flat, relief, seen, shape_error, turns
 
 VIEWS = 24
@@ -42,6 +44,22 @@ def test_a_thing_that_hides_its_far_side_comes_back(degrees: float, rng: np.rand
     often = visible.sum(axis=0) >= 4
     solid = bundle_adjust(W, visible, camera, refine_focal=False)
     assert shape_error(solid.shape[:, often], shape[:, often]) < 0.04
+
+
+@given(SEEDS, CAMERAS)
+@settings(max_examples=4, deadline=None)
+def test_a_shape_known_before_is_where_each_view_shows_it(rng: np.random.Generator, camera: Camera) -> None:
+    """Of any size, turned anyhow, a tenth of its points unknown, on whichever side."""
+    shape = ball(rng)
+    W, placed = seen(np.repeat(shape[None], VIEWS, axis=0), round_about(300.0), camera, depth=1.2)
+    visible = placed[:, 2] - placed[:, 2].mean(axis=1, keepdims=True) < 10.0
+    W = W + 0.2 * rng.normal(size=W.shape) - camera.center_px[:, None]
+    known = 1e-3 * round_about(100.0)[-1] @ shape
+    known[:, ::10] = rng.normal(0, 0.1, known[:, ::10].shape)
+    build = growth_from(W, visible, camera, likeness(W, visible), 7, flat=False).chosen
+    right, posed = np.arange(shape.shape[1]) % 10 > 0, build.posed(known)
+    for bundle, off in ((posed, 0.1 if camera.perspective else 0.01), (build.settled(posed, refine=False)[0], 0.01)):
+        assert np.nanmax(np.nanmedian(build.residual(bundle)[:, right], axis=1)) < off  # affine at first
 
 
 @pytest.mark.parametrize("seed", [5, 8])
