@@ -73,7 +73,7 @@ class PointTracker:
         points = self._retrieve(pictures, points, self._expected(points, motion, predicted_px), motion)
         self._grays = grays
         seen = self._observation(points, motion)
-        return replace(seen, renewed=self._looks.renewed(pictures, self._points, self._affine, seen.visible))
+        return replace(seen, renewed=self._looks.renew(pictures, self._points, self._affine, seen.visible))
 
     def resume(self, image_bgr: Image, expected_px: Array) -> Observation:
         """Find the points in a frame from their rough places alone, and go on from there.

@@ -33,8 +33,8 @@ class Looks:
         self._probes = np.unique(np.linspace(0, len(points_px) - 1, PROBES).astype(np.int64))
         self._now = Appearance(pictures[0], points_px[self._probes], PATCH_RADIUS)
 
-    def renewed(self, pictures: list[Floats], points_px: Array, affine: Array, seen: Flags) -> bool:
-        """Whether a frame is the reference from now on: it shows the points much clearer than that did.
+    def renew(self, pictures: list[Floats], points_px: Array, affine: Array, seen: Flags) -> bool:
+        """Take a frame as the reference if it shows the points much clearer than that did; whether it is.
 
         What was blurred, or out of focus, is not known again when it is sharp. A place is as right as the points are in
         the clearer frame; since each must be so much clearer than the one before, errors hardly add up.

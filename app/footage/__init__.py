@@ -3,5 +3,5 @@
     CASES                  what can be done to a clip, by name, with the error that is wanted at most
     write(clip, case, …)   the copy on disk, its truth and its region
 
-light, cover and surroundings change pictures; camera turns them, and the truth with them; storage writes them.
+light, sharpness, cover and surroundings change pictures; camera turns them, and the truth with them; storage writes them.
 """

@@ -31,8 +31,8 @@ def looks(image: np.ndarray) -> Looks:
 def test_only_a_much_clearer_frame_is_the_reference_from_then_on(first: int, then: int, *, renewed: bool) -> None:
     pictures = pictures_of(Grays.of(shaken(IMAGE, then)))
     known = looks(shaken(IMAGE, first))
-    assert known.renewed(pictures, POINTS, PLAIN, EVERY) is renewed
-    assert not known.renewed(pictures, POINTS, PLAIN, EVERY)  # now it is no clearer
+    assert known.renew(pictures, POINTS, PLAIN, EVERY) is renewed
+    assert not known.renew(pictures, POINTS, PLAIN, EVERY)  # now it is no clearer
     score = known.levels[0].align(pictures[0], POINTS, PLAIN, np.arange(len(POINTS)), 0).score
     assert bool(np.median(score) > 0.99) is (renewed or first == then)
 
@@ -40,7 +40,7 @@ def test_only_a_much_clearer_frame_is_the_reference_from_then_on(first: int, the
 def test_a_frame_that_shows_too_few_of_the_points_is_not() -> None:
     seen = EVERY.copy()
     seen[::3] = False
-    assert not looks(shaken(IMAGE, 9)).renewed(pictures_of(Grays.of(IMAGE)), POINTS, PLAIN, seen)
+    assert not looks(shaken(IMAGE, 9)).renew(pictures_of(Grays.of(IMAGE)), POINTS, PLAIN, seen)
 
 
 def test_points_of_a_shaken_first_frame_are_followed_as_they_are_later() -> None:
