@@ -54,18 +54,18 @@ class Growth:
     def best(
         self, known: Array | None = None, *, whole: bool = False, hidden: bool = True, refine: bool
     ) -> tuple["Growth", Bundle, float]:
-        """Itself, the likeliest bundle and its energy, px²: grown on a dome or on a known shape, or all views at once.
+        """Itself, the likeliest bundle and its energy, px²: grown on a dome, all views at once, or posed by a known shape.
 
         Args:
             known: a shape (3, p) that it may be.
             whole: whether to start from all views at once, too.
-            hidden: whether it hides its far side: views that do not fit are posed anew.
+            hidden: whether it hides its far side: what is known is a start, too, and views that do not fit are posed anew.
             refine: whether the views may change the focal length.
         """
         build = self.chosen
         both_ways = build.factorized() if whole else []
         starts = [*both_ways, self.grown]
-        starts += [] if known is None else [build.posed(known[:, self.some])]
+        starts += [] if known is None or not hidden else [build.posed(known[:, self.some])]
         found = [build.settled(one, refine=refine) for one in starts]
         k = int(np.argmin([energy for _, energy in found]))
         best, energy = found[k]
