@@ -4,10 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.arrays import Array
 from app.pipeline.quality.finding import Grade, Verdict
 from reconstruction.basis.rest_shape import RigidMotion, rms_radius
-from reconstruction.camera import nearest_rotation
+from reconstruction.evaluation import e3d
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
 from reconstruction.mapping.selection import PLAIN, Evidence
@@ -123,7 +122,11 @@ def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
         told = f"a solid that changes by {whole:.1%} of its size while it turns by {turn:.0f}°: how deep it is is a guess"
         yield Verdict("poor" if whole > POOR_CHANGE else "fair", f"{told}; film it turning more")
     at_worst: Grade = "poor" if turn > FAR_TURNED else "fair"  # its sides may be put together wrongly
-    off = 0.0 if evidence.shape is None else unlike(motion.shape, evidence.shape, mirrored=not found.camera.perspective)
+    off = 0.0
+    if evidence.shape is not None:
+        known = np.isfinite(evidence.shape).all(axis=0)
+        half, whole = evidence.shape[None, :, known], motion.shape[None, :, known]
+        off = float(e3d(half, whole, mirrored=not found.camera.perspective)[0])
     if off > OTHERWISE:
         told = f"half of the keyframes find it otherwise, by {off:.0%} of its size: how deep it is is a guess"
         yield Verdict(at_worst, f"{told}; film it turning more")
@@ -133,23 +136,6 @@ def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
     if rare > MOST_RARE:
         yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
-
-
-def unlike(shape: Array, other: Array, *, mirrored: bool) -> float:
-    """How far off another shape is that is laid on a shape as well as it can be, RMS over the size.
-
-    Args:
-        shape: (3, p).
-        other: (3, p) of any size, turned anyhow; NaN where it is not known.
-        mirrored: whether its mirror image is as good.
-    """
-    known = np.isfinite(other).all(axis=0)
-    A, B = (X - X.mean(axis=1, keepdims=True) for X in (other[:, known], shape[:, known]))
-    flips = (1.0, -1.0) if mirrored else (1.0,)
-    products = [B @ (A * [[1.0], [1.0], [flip]]).T for flip in flips]
-    fit = max(float((nearest_rotation(M) * M).sum()) for M in products)
-    share = fit**2 / float((A**2).sum() * (B**2).sum())  # of its squares that the other explains
-    return float(np.sqrt(1 - min(share, 1.0)))
 
 
 def of_sheet(found: IsometricSheet, evidence: Evidence, *, perspective: bool) -> Iterator[Verdict]:
