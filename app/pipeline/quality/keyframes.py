@@ -59,7 +59,7 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         told = "another kind of thing would leave about as much over, so depth may be a guess"
         yield Verdict("fair", f"{told}; film it turning or bending more, from near by")
     if found.rest.kind == "plane":
-        yield from of_plane(found.rest.motion, found.evidence)
+        yield from of_plane(found.rest.motion, found.evidence, perspective=found.camera.perspective)
     if made and found.rest.kind != "plane":
         yield from of_turn(found, found.evidence)
     if found.rest.kind == "rigid":
@@ -80,9 +80,13 @@ def more_than_others(evidence: Evidence) -> float:
     return max(flat.whole_px / max(solid.whole_px, 1e-9), flat.edges_px / max(least_px, 1e-9))
 
 
-def of_plane(motion: RigidMotion, evidence: Evidence) -> Iterator[Verdict]:
-    """What a plane says that leaves much over."""
-    if more_than_others(evidence) > NO_PLANE and evidence.flat.whole_px > NO_PLANE_OFF * radius_px(motion):
+def of_plane(motion: RigidMotion, evidence: Evidence, *, perspective: bool) -> Iterator[Verdict]:
+    """What a plane says that leaves much over: it bends."""
+    if evidence.flat.whole_px < NO_PLANE_OFF * radius_px(motion):
+        return
+    if not perspective:
+        yield MIRRORED
+    if more_than_others(evidence) > NO_PLANE:
         told = f"drawn flat, though a shape with depth leaves {more_than_others(evidence):.1f} times less over"
         yield Verdict("poor", f"{told}: it may bend; film it turning more, from near by, or try --rest-shape sheet")
 

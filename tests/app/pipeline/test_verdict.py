@@ -92,7 +92,7 @@ def test_a_flat_sheet_may_as_well_be_a_solid_without_relief(
     rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
     solid, sheet = Misfit(solid_px, solid_px), Misfit(sheet_px, np.nan)
     known = replace(EVIDENCE, kind="flat", flat=LEFT, solid=solid, sheet=sheet, sureness=sureness)
-    said = verdict(course([0.001] * 50), Map(rest, Camera(), evidence=known))
+    said = verdict(course([0.001] * 50), Map(rest, Camera(500.0), evidence=known))
     assert said.grade == grade
     assert "a flat sheet in many views" in said.reason or grade == "fair"
 
@@ -105,6 +105,16 @@ def test_what_bends_is_drawn_flat(left_px: float, others_px: float, grade: str) 
     said = verdict(course([0.001] * 50), Map(rest, Camera(), evidence=known))
     assert said.grade == grade
     assert ("2.0 times less" in said.reason) == (grade == "poor")
+
+
+@pytest.mark.parametrize(("left_px", "focal", "grade"), [(0.7, np.inf, "fair"), (0.2, np.inf, "good"), (0.7, 500.0, "good")])
+def test_what_is_drawn_flat_may_bend_the_other_way_without_perspective(left_px: float, focal: float, grade: str) -> None:
+    rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
+    left = Misfit(left_px, left_px)
+    known = replace(EVIDENCE, kind="flat", flat=left, solid=left, sheet=left)
+    said = verdict(course([0.001] * 50), Map(rest, Camera(focal), evidence=known))
+    assert said.grade == grade
+    assert ("mirror image" in said.reason) == (grade == "fair")
 
 
 @pytest.mark.parametrize(
