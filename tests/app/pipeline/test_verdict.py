@@ -107,7 +107,7 @@ def test_what_bends_is_drawn_flat(left_px: float, others_px: float, grade: str) 
     assert ("2.0 times less" in said.reason) == (grade == "poor")
 
 
-@pytest.mark.parametrize(("left_px", "focal", "grade"), [(0.7, np.inf, "fair"), (0.2, np.inf, "good"), (0.7, 500.0, "good")])
+@pytest.mark.parametrize(("left_px", "focal", "grade"), [(0.7, np.inf, "fair"), (0.2, np.inf, "good"), (0.7, 500, "good")])
 def test_what_is_drawn_flat_may_bend_the_other_way_without_perspective(left_px: float, focal: float, grade: str) -> None:
     rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
     left = Misfit(left_px, left_px)
