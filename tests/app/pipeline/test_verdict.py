@@ -195,6 +195,14 @@ def test_changes_that_go_with_the_turn(turning: float, turn_degrees: float, grad
     assert ("85% of its changes go with its turn" in said.reason) == (grade != "good")
 
 
+@pytest.mark.parametrize(("otherwise", "grade"), [(0.07, "good"), (0.15, "poor")])
+def test_shapes_far_off_that_would_be_as_likely(otherwise: float, grade: str) -> None:
+    deformations = Deformations(np.eye(3), 0.01, otherwise=otherwise)
+    said = verdict(course([0.001] * 50), replace(SOLID, deformations=deformations))
+    assert said.grade == grade
+    assert ("shapes that are 15% off would be about as likely" in said.reason) == (grade == "poor")
+
+
 @pytest.mark.parametrize(("keyframes", "grade"), [(30, "good"), (60, "fair")])
 def test_points_that_few_keyframes_show_have_no_place(keyframes: int, grade: str) -> None:
     seen = np.ones((keyframes, 27), bool)

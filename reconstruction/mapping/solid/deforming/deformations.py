@@ -21,11 +21,13 @@ class Deformations:
         covariance: (3r, 3r) of Λ', row after row.
         noise: standard deviation of a coordinate of an image point, over the shape's size.
         turning: share of the keyframes' Λ' that goes with their turn, so that which is which is a guess.
+        otherwise: how far off shapes are, as e3d has it, that make the keyframes about as likely.
     """
 
     covariance: Array
     noise: float
     turning: float = 0.0
+    otherwise: float = 0.0
 
     def pull(self, points: int) -> Pull:
         """What it adds to the energy of a frame of so many points."""
@@ -55,6 +57,11 @@ class Learned:
     deformations: Deformations
     taken: float = 0.0
     unlikeliness: float = np.inf
+
+    @property
+    def shapes(self) -> Array:
+        """(K, 3, p) of the keyframes, in no camera's axes."""
+        return np.asarray(self.B[:3] + self.state.Lambda @ self.B[3:-1])
 
 
 def going_with_turn(state: State) -> float:

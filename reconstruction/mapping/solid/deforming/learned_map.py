@@ -59,16 +59,18 @@ def with_deformations(
         trial = learned(model, W, visible & ~hidden, first, first.log_s, TRIAL)
         if not predicted(model, W, hidden, trial, rigid):
             return found
-        start = Start(model, trial, first.log_s)
-        start = likeliest(start, rigid, settings, W, visible, sound) if last else start
+        start, otherwise = Start(model, trial, first.log_s), 0.0
+        if last:
+            start, otherwise = likeliest(start, rigid, settings, W, visible, sound)
         model, trial = start.model, start.known
         latest = about(rigid, model, trial)  # whose poses tell better what moves together
         again = modelled(latest, settings, W, sound, modes)
         log_s = start.log_s + np.log(model.scale / again.scale)  # else each start would let them go further
-        latest = about(latest, again, learned(again, W, visible, carried(model, trial, again), log_s, rounds))
+        known = learned(again, W, visible, carried(model, trial, again), log_s, rounds)
     except np.linalg.LinAlgError:  # of points that lie as none do
         return found
-    return latest.in_order(np.argsort(order))
+    known = replace(known, deformations=replace(known.deformations, otherwise=otherwise))
+    return about(latest, again, known).in_order(np.argsort(order))
 
 
 def carried(model: Model, known: Learned, again: Model) -> State:

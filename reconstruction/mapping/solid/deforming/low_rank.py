@@ -8,7 +8,6 @@ camera and deformation part where three columns of their motion make all rows or
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RigidMotion
@@ -92,6 +91,8 @@ def without_gaps(W: Array, visible: Mask, first: Array, rank: int, far: float) -
 
 def metric(centred: Array, rank: int) -> Array:
     """Of centred images (K, 2, p) the columns (K, 2, 3) of their motion whose rows are nearest to a camera's axes."""
+    from scipy.optimize import least_squares  # takes its time to load, and only what deforms asks
+
     K = len(centred)
     sized = centred / np.sqrt((centred**2).sum(axis=(1, 2), keepdims=True))
     U, s, _ = np.linalg.svd(sized.reshape(2 * K, -1), full_matrices=False)

@@ -2,12 +2,16 @@
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.camera import nearest_rotation
+from reconstruction.evaluation import e3d
+from reconstruction.mapping.factorization import rotations_from_rows
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.bundle import Bundle, seen_by
 from reconstruction.mapping.solid.deforming.deformations import Learned
@@ -22,7 +26,8 @@ from reconstruction.window.window import SlidingWindow
 
 STARTS = (2, 10.0), (4, 10.0), (2, 1e3), (3, 1e3)  # so many shapes; points so many deviations off may be wrong, or swing
 FEW_POINTS = 100  # by which it is seen whether they have
-LIKELIER = 0.12  # of minus the log likelihood of an image point: less is for errors of tracks
+DEPTHS = 0.5, 0.7  # times as deep as the rigid shape
+LIKELIER = 0.15  # of minus the log likelihood of an image point: less is for errors of tracks
 
 
 @dataclass(frozen=True)
@@ -45,10 +50,11 @@ class Start:
         return self.known.unlikeliness + 2 * float(np.log(self.model.radius_px))
 
 
-def likeliest(start: Start, rigid: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) -> Start:
-    """The same, or one about another mean shape (`low_rank`), if that makes much likelier what keyframes show.
+def likeliest(start: Start, rigid: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) -> tuple[Start, float]:
+    """The same, or one about another mean shape, if that makes much likelier what keyframes show.
 
-    All are compared by few modes and few points; the rigid map and other arguments as for `begun`.
+    And how far off it, as e3d has it, shapes about as likely are. Mean shapes are by factorisation (`low_rank`), or
+    shallower. All are compared by few modes and few points; the rigid map and other arguments as for `begun`.
     """
     motion, camera = rigid.rest.motion, rigid.camera
     bundle, off = Bundle(motion, 1 / camera.focal_px), W - camera.center_px[:, None]
@@ -58,14 +64,34 @@ def likeliest(start: Start, rigid: Map, settings: Settings, W: Array, visible: M
         model, first = begun(found, settings, W, visible, sound, USUAL_MODES, FEW_POINTS)
         return Start(model, learned(model, W, visible, first, first.log_s, ROUNDS, FEW_POINTS), first.log_s)
 
-    with suppress(np.linalg.LinAlgError):  # where no Gaussian holds the points
-        limit = begun_by(motion).unlikeliness - LIKELIER
-        for one in STARTS:
-            with suppress(np.linalg.LinAlgError):
-                other = begun_by(posed(off, visible, bundle, *one))
-                if other.unlikeliness < limit:
-                    limit, start = other.unlikeliness, other
-    return start
+    try:
+        usual = begun_by(motion)
+    except np.linalg.LinAlgError:  # no Gaussian holds the points
+        return start, 0.0
+    tried = [usual]
+    means = [
+        *(partial(posed, off, visible, bundle, *one) for one in STARTS),
+        *(partial(shallower, motion, k) for k in DEPTHS),
+    ]
+    for mean in means:
+        with suppress(np.linalg.LinAlgError):
+            tried.append(begun_by(mean()))
+    best = min(tried, key=lambda one: one.unlikeliness)
+    best = best if best.unlikeliness < usual.unlikeliness - LIKELIER else usual
+    alike = [one.known.shapes for one in tried if one.unlikeliness < best.unlikeliness + LIKELIER]
+    apart = [e3d(shapes, best.known.shapes, mirrored=not camera.perspective).mean() for shapes in alike]
+    return start if best is usual else best, float(max(apart))
+
+
+def shallower(motion: RigidMotion, factor: float) -> RigidMotion:
+    """A shape so many times as deep along the usual line of sight, and turned further for that (bas-relief).
+
+    What swells while it turns may look like either.
+    """
+    usual = nearest_rotation(motion.R.sum(axis=0))
+    rows = (motion.R @ usual.T)[:, :2]
+    rows[:, :, 2] /= factor
+    return replace(motion, shape=np.diag([1.0, 1.0, factor]) @ usual @ motion.shape, R=rotations_from_rows(rows))
 
 
 def modelled(found: Map, settings: Settings, W: Array, sound: Mask, modes: int = MOST_MODES) -> Model:

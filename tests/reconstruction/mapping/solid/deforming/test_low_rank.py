@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from reconstruction.arrays import Array, Mask
-from reconstruction.basis.rest_shape import RestShape, rms_radius
+from reconstruction.basis.rest_shape import RestShape, RigidMotion, rms_radius
 from reconstruction.camera import Camera, nearest_rotation
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.deforming.learning import POINTS, learned
 from reconstruction.mapping.solid.deforming.low_rank import posed
-from reconstruction.mapping.solid.deforming.starts import Start, begun, likeliest
+from reconstruction.mapping.solid.deforming.starts import Start, begun, likeliest, shallower
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import Settings
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, seen, turns
@@ -90,11 +90,35 @@ def test_poses_are_believed_if_they_make_images_likelier(swing: float, better: b
     found = rigid(W, visible, PERSPECTIVE)
     model, first = begun(found, Settings(), W, visible, visible, 20)
     start = Start(model, learned(model, W, visible, first, first.log_s), first.log_s)
-    other = likeliest(start, found, Settings(), W, visible, visible)
+    other, otherwise = likeliest(start, found, Settings(), W, visible, visible)
     assert (other is not start) == better
+    assert otherwise < 0.1
     if better:
         errors = []
         for one in (start, other):
             state, B = one.known.state, one.known.B
             errors.append(e3d(state.scaled_rotations() @ (B[:3] + state.Lambda @ B[3:-1]), shapes).mean())
         assert errors[1] < 0.6 * errors[0]
+
+
+def test_a_shape_half_as_deep_that_turns_twice_as_far_looks_alike() -> None:
+    shape, R = np.random.default_rng(0).normal(size=(3, P)), turns(K, 16.0)
+    motion = RigidMotion(shape, R @ nearest_rotation(R.sum(axis=0)).T, np.ones(K), np.zeros((K, 2)))
+    flatter = shallower(motion, 0.5)
+    assert flatter.shape == pytest.approx(shape * [[1], [1], [0.5]], rel=1e-6)
+    moved, off = (other.R[:, :2] @ other.shape - motion.shape[:2] for other in (motion, flatter))
+    assert np.abs(off - moved).mean() < 0.3 * np.abs(moved).mean()
+
+
+def test_what_shrinks_while_it_turns_hardly_may_be_of_another_depth() -> None:
+    rng = np.random.default_rng(1)
+    shape = rng.normal(size=(3, P))
+    shape *= 60 / np.linalg.norm(shape, axis=0)
+    shape[2] = -np.abs(shape[2])  # the near side of a ball
+    shrinking = 1 - 0.8 * np.linspace(0, 1, K)[:, None, None] * (np.arange(P) % 2)
+    W, _ = seen(shape * shrinking, turns(K, 8.0), ORTHOGRAPHIC)
+    W, visible = W + 0.2 * rng.normal(size=W.shape), np.ones((K, P), bool)
+    found = rigid(W, visible, ORTHOGRAPHIC)
+    model, first = begun(found, Settings(), W, visible, visible, 20)
+    start = Start(model, learned(model, W, visible, first, first.log_s), first.log_s)
+    assert likeliest(start, found, Settings(), W, visible, visible)[1] > 0.1
