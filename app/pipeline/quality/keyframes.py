@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.pipeline.quality.finding import Grade, Verdict
-from reconstruction.basis.rest_shape import RigidMotion, rms_radius
+from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
@@ -16,16 +16,17 @@ FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
 POOR_LENGTHS = 0.07  # change of them from half to half of the keyframes: sheets have up to 4.5 %, things with limbs 8 %
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
-NO_PLANE, NO_PLANE_OFF = 1.5, 0.006  # times as much as others, and share of its radius, that a plane that bends leaves over
+NO_PLANE, NO_PLANE_OFF = (
+    1.5,
+    0.0065,
+)  # times as much as others, and share of its radius, that a plane that bends leaves over
 # What a rigid shape leaves over and neighbours share, which is no noise, over its radius and the sine of its turn: as much
 # its depth may be off, and more.
-FAIR_DEPTH = 0.0125
-FAIR_CHANGE, POOR_CHANGE = 0.028, 0.04  # the same with noise, over the radius alone: what changes is no longer small
+FAIR_DEPTH = 0.0135
+FAIR_CHANGE, POOR_CHANGE = 0.031, 0.044  # the same with noise, over the radius alone: what changes is no longer small
 FAR_TURNED = 90.0  # degrees: views of a solid that turns farther share few points
 WITH_TURN = 0.7  # share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85
-AS_LIKELY = (
-    0.1  # of its size, that shapes about as likely are elsewhere: heads have up to 0.07, hearts that turn hardly 0.2
-)
+AS_LIKELY = 0.1  # of its size, that shapes about as likely are elsewhere: heads have up to 0.07, hearts 0.2
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE = 0.15  # of its size, that half of the keyframes find a solid elsewhere: those that deform have up to 0.1
 FAIR_BY_FOCAL, POOR_BY_FOCAL = 0.02, 0.05  # of its size, that shapes may be off by a focal length that was looked for
@@ -95,8 +96,9 @@ def of_plane(motion: RigidMotion, evidence: Evidence, *, perspective: bool) -> I
 
 
 def radius_px(motion: RigidMotion) -> float:
-    """RMS radius of a rigid shape as seen in its usual view: the shape may have any size."""
-    return float(np.median(motion.s)) * rms_radius(motion.shape)
+    """RMS radius of a rigid shape's usual image: what is too deep by far is no larger for that."""
+    images = motion.R[:, :2] @ motion.shape
+    return float(np.median(motion.s * np.sqrt(images.var(axis=2).sum(axis=1))))
 
 
 def of_turn(found: Map, evidence: Evidence) -> Iterator[Verdict]:

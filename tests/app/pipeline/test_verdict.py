@@ -120,7 +120,7 @@ def test_what_is_drawn_flat_may_bend_the_other_way_without_perspective(left_px: 
 @pytest.mark.parametrize(
     ("whole_px", "edges_px", "turn_degrees", "grade"),
     [(1.5, 0.5, 60.0, "fair"), (1.5, 0.5, 5.0, "poor"), (0.5, 0.2, 60.0, "good"), (0.5, 0.2, 12.0, "fair"),
-     (1.5, 1.5, 30.0, "good"), (1.9, 1.9, 60.0, "fair"), (1.9, 0.5, 60.0, "fair"), (1.9, 0.5, 30.0, "fair"),
+     (1.2, 1.2, 30.0, "good"), (1.6, 1.6, 60.0, "fair"), (1.6, 0.5, 60.0, "fair"), (1.6, 0.5, 30.0, "fair"),
      (2.5, 2.5, 60.0, "poor"), (4.6, 4.0, 60.0, "poor")],
     ids=["changes", "and hardly turns", "hardly changes", "nor turns", "noise", "much of it", "changes much",
          "and turns less", "too much", "is no solid"],
@@ -132,6 +132,12 @@ def test_the_depth_of_a_solid_that_changes(whole_px: float, edges_px: float, tur
         said = verdict(course([0.001] * 50), replace(SOLID, evidence=seen).scaled(size))
         assert said.grade == grade
         assert ("how deep it is is a guess" in said.reason) == (grade != "good")
+
+
+def test_a_shape_that_is_too_deep_seems_to_change_no_less() -> None:
+    deep = replace(REST, motion=replace(REST.motion, shape=REST.motion.shape * [[1], [1], [3]]))
+    evidence = replace(EVIDENCE, flat=Misfit(20.0, 20.0), solid=Misfit(2.5, 2.5), turn_degrees=60.0)
+    assert verdict(course([0.001] * 50), replace(SOLID, rest=deep, evidence=evidence)).grade == "poor"
 
 
 @pytest.mark.parametrize(("turn_degrees", "grade"), [(30.0, "fair"), (150.0, "poor")])
