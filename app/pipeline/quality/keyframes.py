@@ -25,7 +25,8 @@ NO_PLANE, NO_PLANE_OFF = (
 FAIR_DEPTH = 0.0135
 FAIR_CHANGE, POOR_CHANGE = 0.031, 0.044  # the same with noise, over the radius alone: what changes is no longer small
 FAR_TURNED = 90.0  # degrees: views of a solid that turns farther share few points
-WITH_TURN = 0.7  # share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85
+# Share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85; heads that chew 0.93.
+WITH_TURN, ALL_WITH_TURN = 0.7, 0.95
 AS_LIKELY = 0.1  # of its size, that shapes about as likely are elsewhere: heads have up to 0.07, hearts 0.2
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE = 0.15  # of its size, that half of the keyframes find a solid elsewhere: those that deform have up to 0.1
@@ -141,7 +142,8 @@ def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
         yield Verdict(at_worst, f"{told}; film it turning more")
     if found.deformations is not None and found.deformations.turning > WITH_TURN:
         told = f"{found.deformations.turning:.0%} of its changes go with its turn: which is which is a guess"
-        yield Verdict(at_worst, f"{told}; film it turning while it keeps its shape")
+        all_of_it = found.deformations.turning > ALL_WITH_TURN
+        yield Verdict("poor" if all_of_it else at_worst, f"{told}; film it turning while it keeps its shape")
     if found.deformations is not None and found.deformations.otherwise > AS_LIKELY:
         told = f"shapes that are {found.deformations.otherwise:.0%} off would be about as likely: how deep it is is a guess"
         yield Verdict("poor", f"{told}; film it turning more, while it keeps its shape")

@@ -190,7 +190,8 @@ def test_a_solid_that_explains_hardly_more_than_a_plane(flat_px: float, grade: s
 
 
 @pytest.mark.parametrize(
-    ("turning", "turn_degrees", "grade"), [(0.6, 30.0, "good"), (0.85, 30.0, "fair"), (0.85, 150.0, "poor")]
+    ("turning", "turn_degrees", "grade"),
+    [(0.6, 30.0, "good"), (0.85, 30.0, "fair"), (0.85, 150.0, "poor"), (0.99, 30.0, "poor")],
 )
 def test_changes_that_go_with_the_turn(turning: float, turn_degrees: float, grade: str) -> None:
     evidence = replace(EVIDENCE, turn_degrees=turn_degrees)
@@ -198,7 +199,7 @@ def test_changes_that_go_with_the_turn(turning: float, turn_degrees: float, grad
         course([0.001] * 50), replace(SOLID, evidence=evidence, deformations=Deformations(np.eye(3), 0.01, turning))
     )
     assert said.grade == grade
-    assert ("85% of its changes go with its turn" in said.reason) == (grade != "good")
+    assert (f"{turning:.0%} of its changes go with its turn" in said.reason) == (grade != "good")
 
 
 @pytest.mark.parametrize(("otherwise", "grade"), [(0.07, "good"), (0.15, "poor")])
