@@ -25,7 +25,7 @@ NO_PLANE, NO_PLANE_OFF = (
 FAIR_DEPTH = 0.0135
 FAIR_CHANGE, POOR_CHANGE = 0.031, 0.044  # the same with noise, over the radius alone: what changes is no longer small
 FAR_TURNED = 90.0  # degrees: views of a solid that turns farther share few points
-# Share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85; heads that chew 0.93.
+# Share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85, who chews 0.93.
 WITH_TURN, ALL_WITH_TURN = 0.7, 0.95
 AS_LIKELY = 0.1  # of its size, that shapes about as likely are elsewhere: heads have up to 0.07, hearts 0.2
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
