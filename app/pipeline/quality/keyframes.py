@@ -91,8 +91,10 @@ def of_plane(motion: RigidMotion, evidence: Evidence, *, perspective: bool) -> I
         return
     if not perspective:
         yield MIRRORED
-    if more_than_others(evidence) > NO_PLANE:
-        told = f"drawn flat, though a shape with depth leaves {more_than_others(evidence):.1f} times less over"
+    told_px = max(float(np.nan_to_num(evidence.told_px, nan=np.inf)), 1e-9)  # by a sheet that knows its lengths
+    more = max(more_than_others(evidence), evidence.flat.edges_px / told_px)
+    if more > NO_PLANE:
+        told = f"drawn flat, though a shape with depth leaves {more:.1f} times less over"
         yield Verdict("poor", f"{told}: it may bend; film it turning more, from near by, or try --rest-shape sheet")
 
 

@@ -97,11 +97,14 @@ def test_a_flat_sheet_may_as_well_be_a_solid_without_relief(
     assert "a flat sheet in many views" in said.reason or grade == "fair"
 
 
-@pytest.mark.parametrize(("left_px", "others_px", "grade"), [(2.0, 1.0, "poor"), (2.0, 1.5, "fair"), (0.25, 0.12, "fair")])
-def test_what_bends_is_drawn_flat(left_px: float, others_px: float, grade: str) -> None:
+@pytest.mark.parametrize(
+    ("left_px", "others_px", "told_px", "grade"),
+    [(2.0, 1.0, np.nan, "poor"), (2.0, 1.5, np.nan, "fair"), (2.0, 1.5, 1.0, "poor"), (0.25, 0.12, 0.1, "fair")],
+)
+def test_what_bends_is_drawn_flat(left_px: float, others_px: float, told_px: float, grade: str) -> None:
     rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
     others = Misfit(others_px, others_px)
-    known = replace(EVIDENCE, kind="flat", flat=Misfit(left_px, left_px), solid=others, sheet=others)
+    known = replace(EVIDENCE, kind="flat", flat=Misfit(left_px, left_px), solid=others, sheet=others, told_px=told_px)
     said = verdict(course([0.001] * 50), Map(rest, Camera(), evidence=known))
     assert said.grade == grade
     assert ("2.0 times less" in said.reason) == (grade == "poor")
