@@ -139,6 +139,23 @@ def swelling(rng: np.random.Generator) -> Shape:
     return lambda places, time: solid.balloon(places, 0.55 - 0.4 * np.cos(3 * np.pi * time + a))
 
 
+def drawn_out(rng: np.random.Generator) -> Shape:
+    """Rubber that is drawn out by up to 40 % and let go, a third of that narrower meanwhile, a little bent."""
+    along, a = rng.uniform(0, np.pi), rng.uniform(0, 2 * np.pi)
+
+    def shape(places: Array, time: float) -> Array:
+        longer = 0.2 * (1 + np.sin(4 * np.pi * time + a))
+        return sheet.bent(places * (0.8 * (1 + longer), 1 - longer / 3), along, lambda arc: 0.8 * np.sin(2 * arc))
+
+    return shape
+
+
+def tearing(rng: np.random.Generator) -> Shape:
+    """Paper that is torn from its upper edge down, one half bent to the front, the other to the back."""
+    begun, bend = rng.uniform(-0.3, -0.2), rng.uniform(1.0, 2.0)
+    return lambda places, time: sheet.torn(places, begun + 0.45 * time, bend)
+
+
 def living(shape: Callable[[Array], Array], pull: float) -> Maker:
     """Solids that are pulled so far at four places, of their width, again and again, each at its own pace."""
 
@@ -217,4 +234,6 @@ KINDS = {
     "can": Kind("solid", still(solid.can), SOLID_TURN, held_back=True),
     "drum": Kind("solid", still(solid.drum), (120.0, 180.0)),
     "balloon": Kind("", swelling, SOLID_TURN),
+    "rubber": Kind("", drawn_out, SOLID_TURN, held_back=True),
+    "tear": Kind("", tearing, SOLID_TURN, held_back=True),
 }

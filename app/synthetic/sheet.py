@@ -1,4 +1,4 @@
-"""Shapes of a sheet that bends and keeps all lengths: bent along parallel lines, along lines through a point, or folded.
+"""Shapes of a sheet that keeps all lengths: bent along parallel lines, along lines through a point, folded, or torn.
 
 A place on the flat sheet is (x, y), its shape a point (x, y, z) with z to the back; the unit is the sheet's width.
 """
@@ -55,3 +55,13 @@ def turned_from(apex: Array, places: Array) -> Array:
 def folded(places: Array, along_rad: float, fold_rad: float) -> Array:
     """Shape (n, 3) of places (n, 2) on a sheet with a crease through its middle, each half turned back by half the fold."""
     return bent(places, along_rad, lambda arc: np.sign(arc) * fold_rad / 2)
+
+
+def torn(places: Array, down_to: float, bend: float) -> Array:
+    """Shape (n, 3) of places (n, 2) on a sheet torn in its middle from above down to a y, each half bent there by so much.
+
+    The left half goes to the back, the right one to the front; `bend` is the curvature, in rad over the sheet's width.
+    """
+    x, y = places.T
+    above = np.maximum(down_to - y, 0.0)
+    return np.column_stack([x, y + above - np.sin(bend * above) / bend, -np.sign(x) * (1 - np.cos(bend * above)) / bend])

@@ -40,3 +40,21 @@ def test_a_curtain_stretches_and_moves_least_at_its_rod() -> None:
     assert lengths.min() == pytest.approx(0.97, abs=0.005)
     deep = moved[..., 2].std(axis=0)
     assert deep[8] > 2 * deep[0] > 0
+
+
+def test_torn_paper_keeps_its_lengths_and_parts_above_where_it_is_torn() -> None:
+    torn = scene("tear", 3).shape
+    down = np.column_stack([np.full(1001, 0.2), np.linspace(-0.375, 0.375, 1001)])
+    lengths = [np.linalg.norm(np.diff(torn(down, time), axis=0), axis=1).sum() for time in (0.0, 1.0)]
+    assert lengths == pytest.approx([0.75, 0.75], rel=1e-5)
+    left, right = (torn(np.array([[x, y] for y in (-0.375, 0.3)]), 1.0) for x in (-1e-3, 1e-3))
+    above, below = np.linalg.norm(left - right, axis=1)
+    assert above > 0.2
+    assert below < 0.01
+
+
+def test_rubber_is_drawn_out() -> None:
+    rubber = scene("rubber", 3).shape
+    ends = np.array([[-0.5, 0.0], [0.5, 0.0]])
+    lengths = [np.ptp(rubber(ends, time), axis=0)[0] for time in np.linspace(0, 1, 30)]
+    assert max(lengths) > 1.3 * min(lengths)
