@@ -138,7 +138,7 @@ class Mapper:
         (W, visible, _), more = self._keyframes.spread(), cache(lambda: spread_of(frames, MORE * KEYFRAMES))
         found = map_of(W, visible, *self._told(camera, self.start), last=lambda: more()[:2])
         if found is not None and found.rest.kind == "rigid":
-            found = with_deformations(found, self._settings, *more())
+            found = with_deformations(found, self._settings, *more(), self.start)
         found = found or self._found
         self._final = found and self._begin and nearest_first(found, *self._begin)
         return self._final

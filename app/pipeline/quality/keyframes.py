@@ -19,7 +19,7 @@ TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
 NO_PLANE, NO_PLANE_OFF = (
     1.5,
     0.0065,
-)  # times as much as others, and share of its radius, that a plane that bends leaves over
+)  # times as much as others, and share of its radius, that what bends leaves over a plane
 # What a rigid shape leaves over and neighbours share, which is no noise, over its radius and the sine of its turn: as much
 # its depth may be off, and more.
 FAIR_DEPTH = 0.0135

@@ -14,6 +14,8 @@ from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.deformations import Learned, going_with_turn
 from reconstruction.mapping.solid.deforming.learning import RIGHTED, ROUNDS, learned
 from reconstruction.mapping.solid.deforming.starts import Start, begun, likeliest, modelled
+from reconstruction.mapping.start import Start as Begin
+from reconstruction.mapping.start import at_once
 from reconstruction.settings import MORE_MODES, MOST_MODES, Settings
 from reconstruction.state import State
 from reconstruction.window.robust import lengths
@@ -33,6 +35,7 @@ def with_deformations(
     W: Array,
     visible: Mask,
     frames: Indices,
+    begin: Begin = at_once,
     *,
     last: bool = True,
 ) -> Map:
@@ -44,6 +47,7 @@ def with_deformations(
         W: (K, 2, p) px the keyframes; anything where not visible.
         visible: (K, p).
         frames: (K,) their numbers.
+        begin: where a part of the work is done, meanwhile.
         last: whether there will be no other map, so that time may be spent on it. Else fewer modes, which take a quarter of
             the time, in fewer rounds, since what they leave over leads astray in many, from the rigid shape alone.
     """
@@ -61,7 +65,7 @@ def with_deformations(
             return found
         start, otherwise = Start(model, trial, first.log_s), 0.0
         if last:
-            start, otherwise = likeliest(start, rigid, settings, W, visible, sound)
+            start, otherwise = likeliest(start, rigid, settings, W, visible, sound, begin)
         model, trial = start.model, start.known
         latest = about(rigid, model, trial)  # whose poses tell better what moves together
         again = modelled(latest, settings, W, sound, modes)

@@ -1,5 +1,6 @@
 """Where learning a solid's deformations begins: its modes, and a pose and Λ' of each keyframe."""
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,6 +20,8 @@ from reconstruction.mapping.solid.deforming.learning import POINTS, ROUNDS, lear
 from reconstruction.mapping.solid.deforming.low_rank import posed
 from reconstruction.mapping.solid.deforming.own_motion import own_motion
 from reconstruction.mapping.solid.placing import well_spread
+from reconstruction.mapping.start import Start as Begin
+from reconstruction.mapping.start import at_once
 from reconstruction.settings import MOST_MODES, USUAL_MODES, Settings
 from reconstruction.state import State, join
 from reconstruction.window.energy import build_energy
@@ -50,37 +53,46 @@ class Start:
         return self.known.unlikeliness + 2 * float(np.log(self.model.radius_px))
 
 
-def likeliest(start: Start, rigid: Map, settings: Settings, W: Array, visible: Mask, sound: Mask) -> tuple[Start, float]:
+def likeliest(
+    start: Start, rigid: Map, settings: Settings, W: Array, visible: Mask, sound: Mask, begin: Begin = at_once
+) -> tuple[Start, float]:
     """The same, or one about another mean shape, if that makes much likelier what keyframes show.
 
     And how far off it, as e3d has it, shapes about as likely are. Mean shapes are by factorisation (`low_rank`), or
-    shallower. All are compared by few modes and few points; the rigid map and other arguments as for `begun`.
+    shallower. All are compared by few modes and few points; the rigid map and other arguments as for `begun`, and where a
+    part of the work is done.
     """
     motion, camera = rigid.rest.motion, rigid.camera
-    bundle, off = Bundle(motion, 1 / camera.focal_px), W - camera.center_px[:, None]
-
-    def begun_by(motion: RigidMotion) -> Start:
-        found = replace(rigid, rest=replace(rigid.rest, motion=motion), model=None)
-        model, first = begun(found, settings, W, visible, sound, USUAL_MODES, FEW_POINTS)
-        return Start(model, learned(model, W, visible, first, first.log_s, ROUNDS, FEW_POINTS), first.log_s)
-
-    try:
-        usual = begun_by(motion)
-    except np.linalg.LinAlgError:  # no Gaussian holds the points
+    seen = W - camera.center_px[:, None], visible, Bundle(motion, 1 / camera.focal_px)
+    try_one = partial(tried, rigid, settings, W, visible, sound)
+    factors = begin(each, try_one, [partial(posed, *seen, *one) for one in STARTS])
+    usual, *flatter = each(try_one, [lambda: motion, *(partial(shallower, motion, depth) for depth in DEPTHS)])
+    others = [one for one in (*factors.result(), *flatter) if one]
+    if usual is None:
         return start, 0.0
-    tried = [usual]
-    means = [
-        *(partial(posed, off, visible, bundle, *one) for one in STARTS),
-        *(partial(shallower, motion, k) for k in DEPTHS),
-    ]
-    for mean in means:
-        with suppress(np.linalg.LinAlgError):
-            tried.append(begun_by(mean()))
-    best = min(tried, key=lambda one: one.unlikeliness)
+    best = min(others, key=lambda one: one.unlikeliness, default=usual)
     best = best if best.unlikeliness < usual.unlikeliness - LIKELIER else usual
-    alike = [one.known.shapes for one in tried if one.unlikeliness < best.unlikeliness + LIKELIER]
+    alike = [one.known.shapes for one in (usual, *others) if one.unlikeliness < best.unlikeliness + LIKELIER]
     apart = [e3d(shapes, best.known.shapes, mirrored=not camera.perspective).mean() for shapes in alike]
     return start if best is usual else best, float(max(apart))
+
+
+def each(
+    make: Callable[[Callable[[], RigidMotion]], Start | None], means: list[Callable[[], RigidMotion]]
+) -> list[Start | None]:
+    """What is made of each."""
+    return [make(mean) for mean in means]
+
+
+def tried(
+    rigid: Map, settings: Settings, W: Array, visible: Mask, sound: Mask, mean: Callable[[], RigidMotion]
+) -> Start | None:
+    """What few modes and points tell about another mean shape; None if no Gaussian holds the points."""
+    with suppress(np.linalg.LinAlgError):
+        found = replace(rigid, rest=replace(rigid.rest, motion=mean()), model=None)
+        model, first = begun(found, settings, W, visible, sound, USUAL_MODES, FEW_POINTS)
+        return Start(model, learned(model, W, visible, first, first.log_s, ROUNDS, FEW_POINTS), first.log_s)
+    return None
 
 
 def shallower(motion: RigidMotion, factor: float) -> RigidMotion:
