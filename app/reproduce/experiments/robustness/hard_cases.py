@@ -38,7 +38,7 @@ def hard_cases(work: Work) -> Result:
     unseen = ", ".join(name for name, kind in KINDS.items() if kind.held_back)
     explained = (
         f"Held back, so that nobody tunes on them: seeds from {HELD_SEEDS} on, and {unseen} with every seed. "
-        "A balloon is neither sheet nor solid nor flat: there is no hypothesis for it."
+        "A balloon, rubber and torn paper are neither sheet nor solid nor flat: there is no hypothesis for them."
     )
     return Result(tables, remarks=[explained])
 
