@@ -21,7 +21,7 @@ class Deformations:
         covariance: (3r, 3r) of Λ', row after row.
         noise: standard deviation of a coordinate of an image point, over the shape's size.
         turning: share of the keyframes' Λ' that goes with their turn, so that which is which is a guess.
-        otherwise: how far off shapes are, as e3d has it, that make the keyframes about as likely.
+        otherwise: how far off shapes are, as a share of their size, that make the keyframes about as likely.
     """
 
     covariance: Array

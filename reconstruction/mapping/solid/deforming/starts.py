@@ -11,7 +11,7 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import nearest_rotation
-from reconstruction.evaluation import e3d
+from reconstruction.mapping.evidence import shape_difference
 from reconstruction.mapping.factorization import rotations_from_rows
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.bundle import Bundle, seen_by
@@ -58,7 +58,7 @@ def likeliest(
 ) -> tuple[Start, float]:
     """The same, or one about another mean shape, if that makes much likelier what keyframes show.
 
-    And how far off it, as e3d has it, shapes about as likely are. Mean shapes are by factorisation (`low_rank`), or
+    And how far off it (`apart`) shapes are that are about as likely. Mean shapes are by factorisation (`low_rank`), or
     shallower. All are compared by few modes and few points; the rigid map and other arguments as for `begun`, and where a
     part of the work is done.
     """
@@ -72,9 +72,18 @@ def likeliest(
         return start, 0.0
     best = min(others, key=lambda one: one.unlikeliness, default=usual)
     best = best if best.unlikeliness < usual.unlikeliness - LIKELIER else usual
-    alike = [one.known.shapes for one in (usual, *others) if one.unlikeliness < best.unlikeliness + LIKELIER]
-    apart = [e3d(shapes, best.known.shapes, mirrored=not camera.perspective).mean() for shapes in alike]
-    return start if best is usual else best, float(max(apart))
+    alike = [one for one in (usual, *others) if one.unlikeliness < best.unlikeliness + LIKELIER]
+    otherwise = max(apart(best.known.shapes, one.known.shapes, mirrored=not camera.perspective) for one in alike)
+    return start if best is usual else best, otherwise
+
+
+def apart(shapes: Array, others: Array, *, mirrored: bool) -> float:
+    """How far shapes (K, 3, p) are off others, each turned and scaled as fits best, or off their mirror images."""
+    ours, theirs = (some - some.mean(axis=2, keepdims=True) for some in (shapes, others))
+    mirrors = (1.0, -1.0) if mirrored else (1.0,)
+    return min(
+        float(np.mean([shape_difference(*pair) for pair in zip(ours, side * theirs, strict=True)])) for side in mirrors
+    )
 
 
 def each(
