@@ -55,13 +55,13 @@ def score(shapes: Array, rest: Array, truth: Array, frames: Indices, sigma: Arra
     )
 
 
-def e3d(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = False, mirrored: bool = True) -> Array:
+def e3d(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = False) -> Array:
     """Error (K,) of shapes (K, 3, n) against truth (K, 3, n).
 
-    `turned` grants each frame its best rotation, `mirrored` all of them the better depth sign, `sign_free` each its own.
+    `turned` grants each frame its best rotation, `sign_free` its own depth sign instead of one for all frames.
     """
     truth = truth - truth.mean(axis=2, keepdims=True)
-    off = aligned(shapes, truth, turned=turned, sign_free=sign_free, mirrored=mirrored)[0] - truth
+    off = aligned(shapes, truth, turned=turned, sign_free=sign_free)[0] - truth
     return np.asarray(np.linalg.norm(off, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2)))
 
 
@@ -78,12 +78,10 @@ def error_over_sigma(shapes: Array, sigma: Array, truth: Array) -> float:
     return float(np.median(np.sqrt(squares.mean(axis=1)[told] / variances[told])))
 
 
-def aligned(
-    shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = False, mirrored: bool = True
-) -> tuple[Array, float]:
+def aligned(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = False) -> tuple[Array, float]:
     """Shapes (K, 3, n) as near to truth (K, 3, n), centred, as they can be made, see `e3d`; and their scale."""
     shapes = shapes - shapes.mean(axis=2, keepdims=True)
-    candidates = [shapes, MIRROR @ shapes] if mirrored or sign_free else [shapes]
+    candidates = [shapes, MIRROR @ shapes]
     if turned:
         candidates = [nearest_rotation(truth @ S.transpose(0, 2, 1)) @ S for S in candidates]
     if sign_free:  # both signs have the same size, so the one that correlates more is nearer at any scale

@@ -101,6 +101,18 @@ def medoid(shapes: Array) -> int:
     return int((size[:, None] + size - 2 * nearness).clip(0).sum(axis=1).argmin())
 
 
+def apart(shapes: Array, others: Array, *, mirrored: bool) -> float:
+    """How far shapes (K, 3, p) are off others, over their size, each turned and scaled as fits best: the mean.
+
+    `mirrored` allows for the mirror images of all.
+    """
+    ours, theirs = (some - some.mean(axis=2, keepdims=True) for some in (shapes, others))
+    U, values, Vt = np.linalg.svd(ours @ theirs.swapaxes(1, 2))
+    sizes, side = (ours**2).sum(axis=(1, 2)) * (theirs**2).sum(axis=(1, 2)), np.sign(np.linalg.det(U @ Vt))
+    fits = [values[:, 0] + values[:, 1] + one * values[:, 2] for one in ((side, -side) if mirrored else (side,))]
+    return min(float(np.sqrt((1 - fit**2 / sizes).clip(0)).mean()) for fit in fits)
+
+
 def completed(shape: Array, like: Array) -> Array:
     """A shape (3, p) with its unknown points, NaN, where their neighbours in another are, else at the centre."""
     unknown = np.isnan(shape[0])

@@ -7,6 +7,7 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
+from reconstruction.basis.rest_shape import apart
 from reconstruction.mapping.factorization import Factorization, factorize, view_turn_degrees
 
 TURN_DEGREES = 10.0  # less turn than this and depth drowns in noise
@@ -117,11 +118,4 @@ def halves_disagreement(W: Array, visible: Mask) -> float:
         a, b = (factorize(W[k::2], visible[k::2]).motion.shape for k in (0, 1))
     except ReconstructionError:
         return float("inf")
-    return min(shape_difference(a, b), shape_difference(a, np.diag([1.0, 1.0, -1.0]) @ b))
-
-
-def shape_difference(a: Array, b: Array) -> float:
-    """‖sRb − a‖/‖a‖ of centred shapes (3, p) with the best rotation and scale."""
-    U, values, Vt = np.linalg.svd(a @ b.T)
-    values[2] *= np.sign(np.linalg.det(U @ Vt))
-    return float(np.sqrt(max(0.0, 1 - values.sum() ** 2 / ((a**2).sum() * (b**2).sum()))))
+    return apart(a[None], b[None], mirrored=True)

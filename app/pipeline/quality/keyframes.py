@@ -5,8 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from app.pipeline.quality.finding import Grade, Verdict
-from reconstruction.basis.rest_shape import RigidMotion
-from reconstruction.evaluation import e3d
+from reconstruction.basis.rest_shape import RigidMotion, apart
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
 from reconstruction.mapping.selection import PLAIN, Evidence
@@ -16,10 +15,8 @@ FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
 POOR_STRAIN = 0.018  # of lengths, by noise or not: no depths have been found that keep them
 POOR_LENGTHS = 0.07  # change of them from half to half of the keyframes: sheets have up to 4.5 %, things with limbs 8 %
 TOSS_UP = 1.2  # sureness, up to which another kind of thing may be as true
-NO_PLANE, NO_PLANE_OFF = (
-    1.5,
-    0.0065,
-)  # times as much as others, and share of its radius, that what bends leaves over a plane
+NO_PLANE = 1.5  # times as much as others, that a plane leaves over of what bends;
+NO_PLANE_OFF = 0.0065  # and share of its radius
 # What a rigid shape leaves over and neighbours share, which is no noise, over its radius and the sine of its turn: as much
 # its depth may be off, and more.
 FAIR_DEPTH = 0.0135
@@ -137,8 +134,8 @@ def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     off = 0.0
     if evidence.shape is not None:
         known = np.isfinite(evidence.shape).all(axis=0)
-        half, whole = evidence.shape[None, :, known], motion.shape[None, :, known]
-        off = float(e3d(half, whole, mirrored=not found.camera.perspective)[0])
+        half, all_of_them = evidence.shape[None, :, known], motion.shape[None, :, known]
+        off = apart(half, all_of_them, mirrored=not found.camera.perspective)
     if off > OTHERWISE:
         told = f"half of the keyframes find it otherwise, by {off:.0%} of its size: how deep it is is a guess"
         yield Verdict(at_worst, f"{told}; film it turning more")

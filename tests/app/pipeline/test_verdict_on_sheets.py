@@ -15,6 +15,8 @@ from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.rivals import Misfit
 from tests.app.pipeline.test_verdict import EVIDENCE, LEFT, REST, course
 
+FLAT = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
+
 
 @dataclass
 class Sheet:
@@ -75,10 +77,9 @@ def test_a_sheet_has_the_same_lengths_by_either_half_of_the_keyframes(change: fl
 def test_a_flat_sheet_may_as_well_be_a_solid_without_relief(
     sheet_px: float, solid_px: float, grade: str, sureness: float
 ) -> None:
-    rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
     solid, sheet = Misfit(solid_px, solid_px), Misfit(sheet_px, np.nan)
     known = replace(EVIDENCE, kind="flat", flat=LEFT, solid=solid, sheet=sheet, sureness=sureness)
-    said = verdict(course([0.001] * 50), Map(rest, Camera(500.0), evidence=known))
+    said = verdict(course([0.001] * 50), Map(FLAT, Camera(500.0), evidence=known))
     assert said.grade == grade
     assert "a flat sheet in many views" in said.reason or grade == "fair"
 
@@ -88,19 +89,17 @@ def test_a_flat_sheet_may_as_well_be_a_solid_without_relief(
     [(2.0, 1.0, np.nan, "poor"), (2.0, 1.5, np.nan, "fair"), (2.0, 1.5, 1.0, "poor"), (0.25, 0.12, 0.1, "fair")],
 )
 def test_what_bends_is_drawn_flat(left_px: float, others_px: float, told_px: float, grade: str) -> None:
-    rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
     others = Misfit(others_px, others_px)
     known = replace(EVIDENCE, kind="flat", flat=Misfit(left_px, left_px), solid=others, sheet=others, told_px=told_px)
-    said = verdict(course([0.001] * 50), Map(rest, Camera(), evidence=known))
+    said = verdict(course([0.001] * 50), Map(FLAT, Camera(), evidence=known))
     assert said.grade == grade
     assert ("2.0 times less" in said.reason) == (grade == "poor")
 
 
 @pytest.mark.parametrize(("left_px", "focal", "grade"), [(0.7, np.inf, "fair"), (0.2, np.inf, "good"), (0.7, 500, "good")])
 def test_what_is_drawn_flat_may_bend_the_other_way_without_perspective(left_px: float, focal: float, grade: str) -> None:
-    rest = RestShape("plane", replace(REST.motion, shape=REST.motion.shape * [[1], [1], [0]]), "")
     left = Misfit(left_px, left_px)
     known = replace(EVIDENCE, kind="flat", flat=left, solid=left, sheet=left)
-    said = verdict(course([0.001] * 50), Map(rest, Camera(focal), evidence=known))
+    said = verdict(course([0.001] * 50), Map(FLAT, Camera(focal), evidence=known))
     assert said.grade == grade
     assert ("mirror image" in said.reason) == (grade == "fair")

@@ -9,9 +9,8 @@ import numpy as np
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.model import Model
-from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.basis.rest_shape import RigidMotion, apart
 from reconstruction.camera import nearest_rotation
-from reconstruction.mapping.evidence import shape_difference
 from reconstruction.mapping.factorization import rotations_from_rows
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.bundle import Bundle, seen_by
@@ -75,15 +74,6 @@ def likeliest(
     alike = [one for one in (usual, *others) if one.unlikeliness < best.unlikeliness + LIKELIER]
     otherwise = max(apart(best.known.shapes, one.known.shapes, mirrored=not camera.perspective) for one in alike)
     return start if best is usual else best, otherwise
-
-
-def apart(shapes: Array, others: Array, *, mirrored: bool) -> float:
-    """How far shapes (K, 3, p) are off others, each turned and scaled as fits best, or off their mirror images."""
-    ours, theirs = (some - some.mean(axis=2, keepdims=True) for some in (shapes, others))
-    mirrors = (1.0, -1.0) if mirrored else (1.0,)
-    return min(
-        float(np.mean([shape_difference(*pair) for pair in zip(ours, side * theirs, strict=True)])) for side in mirrors
-    )
 
 
 def each(
