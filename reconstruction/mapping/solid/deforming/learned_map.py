@@ -6,18 +6,15 @@ import numpy as np
 
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.model import Model
-from reconstruction.basis.rest_shape import RigidMotion
-from reconstruction.camera import quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.bundle import seen_by
-from reconstruction.mapping.solid.deforming.deformations import Learned, going_with_turn
-from reconstruction.mapping.solid.deforming.learning import RIGHTED, ROUNDS, learned
-from reconstruction.mapping.solid.deforming.starts import Start, begun, likeliest, modelled
-from reconstruction.mapping.start import Start as Begin
-from reconstruction.mapping.start import at_once
+from reconstruction.mapping.solid.deforming.attempt import Attempt, begun, gone_on
+from reconstruction.mapping.solid.deforming.deformations import Learned
+from reconstruction.mapping.solid.deforming.learning import RIGHTED, learned
+from reconstruction.mapping.solid.deforming.starts import likeliest
+from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import MORE_MODES, MOST_MODES, Settings
-from reconstruction.state import State
 from reconstruction.window.robust import lengths
 from reconstruction.window.statistics import residuals
 
@@ -35,7 +32,7 @@ def with_deformations(
     W: Array,
     visible: Mask,
     frames: Indices,
-    begin: Begin = at_once,
+    begin: Start = at_once,
     *,
     last: bool = True,
 ) -> Map:
@@ -53,41 +50,25 @@ def with_deformations(
     """
     if settings.deformation not in ("auto", "general") or settings.priors.keys() & {"rest", "smoothness"}:
         return found
-    modes, rounds = (MOST_MODES, ROUNDS) if last else (MORE_MODES, FEW_ROUNDS)
     order = np.argsort(frames)
     W, visible = np.where(visible[:, None], W, 0.0)[order], visible[order]
     sound, rigid = without_outliers(W, visible), found.in_order(order)
     try:
-        model, first = begun(rigid, settings, W, visible, sound, modes)
+        model, first = begun(rigid, settings, W, visible, sound, MOST_MODES if last else MORE_MODES)
         hidden = sound & (np.random.default_rng(0).random(visible.shape) < HIDDEN)
         trial = learned(model, W, visible & ~hidden, first, first.log_s, TRIAL)
         if not predicted(model, W, hidden, trial, rigid):
             return found
-        start, otherwise = Start(model, trial, first.log_s), 0.0
+        start, shown, otherwise = Attempt(model, trial, first.log_s), (rigid, settings, W, visible, sound), 0.0
         if last:
-            start, otherwise = likeliest(start, rigid, settings, W, visible, sound, begin)
-        model, trial = start.model, start.known
-        latest = about(rigid, model, trial)  # whose poses tell better what moves together
-        again = modelled(latest, settings, W, sound, modes)
-        log_s = start.log_s + np.log(model.scale / again.scale)  # else each start would let them go further
-        known = learned(again, W, visible, carried(model, trial, again), log_s, rounds)
+            end, otherwise = likeliest(start, *shown, begin)
+        else:
+            end = gone_on(start, *shown, MORE_MODES, FEW_ROUNDS)
     except np.linalg.LinAlgError:  # of points that lie as none do
         return found
-    known = replace(known, deformations=replace(known.deformations, otherwise=otherwise))
-    return about(latest, again, known).in_order(np.argsort(order))
-
-
-def carried(model: Model, known: Learned, again: Model) -> State:
-    """What is known of keyframes by one model, in the modes of another that is about the same rest shape."""
-    state = known.state
-    turn = again.basis.Phi.T @ model.basis.Phi
-    deformed = turn @ state.Lambda @ known.B[3:-1] * (model.radius / again.radius)
-    return State(
-        quaternion_from_rotation(rotation_from_quaternion(state.q) @ turn.T),
-        state.t * (model.radius_px / again.radius_px),
-        state.log_s + np.log(model.scale / again.scale),
-        deformed @ np.linalg.pinv(again.B[3:-1]),
-    )
+    known = end.about(rigid)
+    assert known.deformations
+    return replace(known, deformations=replace(known.deformations, otherwise=otherwise)).in_order(np.argsort(order))
 
 
 def predicted(model: Model, W: Array, hidden: Mask, known: Learned, rigid: Map) -> bool:
@@ -104,15 +85,3 @@ def predicted(model: Model, W: Array, hidden: Mask, known: Learned, rigid: Map) 
     most = np.quantile(now, COMPARED) < BETTER * np.quantile(then, COMPARED)
     whole = [float(np.sqrt((left**2).mean())) for left in (now, then)]
     return bool(most) or (whole[1] > DRIFT and whole[0] < BETTER * whole[1])
-
-
-def about(found: Map, model: Model, known: Learned) -> Map:
-    """The map about another rest shape, with the poses that its keyframes have then."""
-    Phi, state = model.basis.Phi, known.state
-    shape = model.radius * Phi @ known.B[:3]
-    R, s = rotation_from_quaternion(state.q) @ Phi.T, model.scale * np.exp(state.log_s)
-    motion = RigidMotion(shape, R, s, model.radius_px * state.t)
-    rest = replace(found.rest, motion=motion)
-    model = Model(replace(model.basis, rest=shape), model.mesh, model.camera, float(motion.s[0]))
-    deformations = replace(known.deformations, turning=going_with_turn(state))
-    return replace(found, rest=rest, modes=len(model.basis.eigenvalues), model=model, deformations=deformations)

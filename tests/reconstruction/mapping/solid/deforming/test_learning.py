@@ -11,9 +11,9 @@ from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map, map_of
 from reconstruction.mapping.mapper import on_the_way
 from reconstruction.mapping.solid.deforming import learned_map, rounds
+from reconstruction.mapping.solid.deforming.attempt import begun
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations
 from reconstruction.mapping.solid.deforming.learning import POINTS, learned
-from reconstruction.mapping.solid.deforming.starts import begun
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import Settings
 from reconstruction.state import State

@@ -13,11 +13,10 @@ from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.deforming import learning
 from reconstruction.mapping.solid.deforming import rounds as em
-from reconstruction.mapping.solid.deforming.learned_map import about, carried
+from reconstruction.mapping.solid.deforming.attempt import Attempt, modelled
 from reconstruction.mapping.solid.deforming.learning import learned
 from reconstruction.mapping.solid.deforming.reversal import in_reverse, righted
 from reconstruction.mapping.solid.deforming.rounds import Rounds
-from reconstruction.mapping.solid.deforming.starts import modelled
 from reconstruction.settings import Settings
 from reconstruction.state import State
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, seen
@@ -98,8 +97,9 @@ def test_a_flat_shape_in_reverse_looks_the_same() -> None:
 def test_what_is_known_is_carried_to_other_modes() -> None:
     W, _, rigid, model, state = fish(PERSPECTIVE)
     known = learned(model, W, EVERYTHING, state, state.log_s, rounds=6)
-    again = modelled(about(rigid, model, known), Settings(), W, EVERYTHING)
-    before, after = turned(known.B, known.state), turned(again.B, carried(model, known, again))
+    attempt = Attempt(model, known, state.log_s)
+    again = modelled(attempt.about(rigid), Settings(), W, EVERYTHING)
+    before, after = turned(known.B, known.state), turned(again.B, attempt.carried(again))
     assert e3d(after, before).max() < 0.01
     np.testing.assert_allclose(after * again.radius_px, before * model.radius_px, atol=0.02 * model.radius_px)
 

@@ -1,0 +1,117 @@
+"""An attempt at learning a solid's deformations: a mean shape with its modes, and what keyframes tell with them."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from reconstruction.arrays import Array, Mask
+from reconstruction.basis.model import Model
+from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.camera import quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.mapping.map import Map
+from reconstruction.mapping.solid.bundle import seen_by
+from reconstruction.mapping.solid.deforming.deformations import Learned, going_with_turn
+from reconstruction.mapping.solid.deforming.learning import POINTS, ROUNDS, learned
+from reconstruction.mapping.solid.deforming.own_motion import own_motion
+from reconstruction.mapping.solid.placing import well_spread
+from reconstruction.settings import MOST_MODES, Settings
+from reconstruction.state import State, join
+from reconstruction.window.energy import build_energy
+from reconstruction.window.window import SlidingWindow
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What has been learned so far.
+
+    Attributes:
+        model: a mean shape with its modes.
+        known: what keyframes tell with them.
+        log_s: (K,) to which scales are held.
+    """
+
+    model: Model
+    known: Learned
+    log_s: Array
+
+    @property
+    def unlikeliness(self) -> float:
+        """Minus the log likelihood of an image point in px."""
+        return self.known.unlikeliness + 2 * float(np.log(self.model.radius_px))
+
+    def about(self, found: Map) -> Map:
+        """The map about its rest shape, with the poses that keyframes have then."""
+        model, Phi, state = self.model, self.model.basis.Phi, self.known.state
+        shape = model.radius * Phi @ self.known.B[:3]
+        R, s = rotation_from_quaternion(state.q) @ Phi.T, model.scale * np.exp(state.log_s)
+        motion = RigidMotion(shape, R, s, model.radius_px * state.t)
+        rest = replace(found.rest, motion=motion)
+        model = Model(replace(model.basis, rest=shape), model.mesh, model.camera, float(motion.s[0]))
+        deformations = replace(self.known.deformations, turning=going_with_turn(state))
+        return replace(found, rest=rest, modes=len(model.basis.eigenvalues), model=model, deformations=deformations)
+
+    def carried(self, again: Model) -> State:
+        """Pose and Λ' of keyframes in the modes of another model, about the same rest shape."""
+        model, state = self.model, self.known.state
+        turn = again.basis.Phi.T @ model.basis.Phi
+        deformed = turn @ state.Lambda @ self.known.B[3:-1] * (model.radius / again.radius)
+        return State(
+            quaternion_from_rotation(rotation_from_quaternion(state.q) @ turn.T),
+            state.t * (model.radius_px / again.radius_px),
+            state.log_s + np.log(model.scale / again.scale),
+            deformed @ np.linalg.pinv(again.B[3:-1]),
+        )
+
+
+def gone_on(
+    attempt: Attempt,
+    found: Map,
+    settings: Settings,
+    W: Array,
+    visible: Mask,
+    sound: Mask,
+    modes: int = MOST_MODES,
+    rounds: int = ROUNDS,
+    points: int = POINTS,
+) -> Attempt:
+    """Where it leads to, by so many modes made anew: poses learned so far tell better what moves together.
+
+    Arguments as for `begun` and `learned`, which says what is raised.
+    """
+    again = modelled(attempt.about(found), settings, W, sound, modes)
+    log_s = attempt.log_s + np.log(attempt.model.scale / again.scale)  # else each attempt would let them go further
+    return Attempt(again, learned(again, W, visible, attempt.carried(again), log_s, rounds, points), log_s)
+
+
+def modelled(found: Map, settings: Settings, W: Array, sound: Mask, modes: int = MOST_MODES) -> Model:
+    """Modes by what moves together, for keyframes in their order; arguments as for `begun`."""
+    motion = found.rest.motion
+    apart = own_motion((seen_by(found.camera, motion) - W) / motion.s[:, None, None], sound)
+    return replace(found, modes=modes, model=None).modelled(settings, own_motion=apart)
+
+
+def begun(
+    found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask, modes: int = MOST_MODES, points: int = POINTS
+) -> tuple[Model, State]:
+    """Modes by what moves together, and pose and Λ' of each keyframe by itself.
+
+    Args:
+        found: the map of keyframes, in their order.
+        settings: how to reconstruct.
+        W: (K, 2, p) px; finite.
+        visible: (K, p).
+        sound: (K, p) of that, what is not grossly wrong.
+        modes: how many.
+        points: at most, by which poses are found.
+    """
+    motion, model = found.rest.motion, modelled(found, settings, W, sound, modes)
+    some = well_spread(model.B[:3], visible, points)
+    few = model.of_points(some)
+    energy = build_energy(few, "general", settings.priors)
+    window = SlidingWindow(few, energy, settings.window, replace(motion, shape=motion.shape[:, some]))
+    states = []
+    for one, seen in zip(W[:, :, some], visible[:, some], strict=True):
+        window.advance(one, seen)
+        assert window.state is not None
+        states.append(window.state[-1:])
+    return model, join(states)
