@@ -38,6 +38,7 @@ RIGID_POINTS = 150  # enough to tell how well anything rigid fits
 NEIGHBOURS = 6  # of each
 OFTEN = 0.8  # of the keyframes in which a point to compare is seen
 SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
+NO_PLANE = 0.1  # of the images' size: what leaves so much over is no plane, whether or not it is a solid of one shape
 LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
 SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave so many times less than anything rigid, ...
 STRETCH_FREEDOM = 150.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane,
@@ -115,7 +116,10 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     shape = np.full((3, W.shape[2]), np.nan)
     shape[:, few] = rigid.shape
     turn, relief = rigid.turn_degrees, rigid.relief
-    return Evidence(rigid.flat, rigid.solid, turn, relief, kind, sheet, change, sureness, told_px, shape=shape)
+    size = rigid.size_px
+    return Evidence(
+        rigid.flat, rigid.solid, turn, relief, kind, sheet, change, sureness, told_px, shape=shape, size_px=size
+    )
 
 
 def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan) -> tuple[Kind, float]:
@@ -132,7 +136,9 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan)
     """
     flat, solid = rigid.flat, rigid.solid
     gain = max(flat.whole_px, 1e-300) / max(SOLID_FREEDOM * solid.whole_px, 1e-300)
-    best: Kind = "solid" if gain > 1 and rigid.relief > LEAST_RELIEF else "flat"
+    best: Kind = "flat"
+    if rigid.relief > LEAST_RELIEF and (gain > 1 or flat.whole_px > NO_PLANE * rigid.size_px):
+        best = "solid"
     stiff_px = min(flat.edges_px, solid.edges_px)
     rigid_px, least = solid.edges_px if best == "solid" else stiff_px, SHEET_FREEDOM
     explained = max(0.0, 1 - (solid.edges_px / max(flat.edges_px, 1e-300)) ** 2)  # by relief, of what a plane leaves

@@ -37,6 +37,7 @@ class Rigid:
         flat, solid: what each leaves over.
         turn_degrees, relief: of the solid.
         shape: (3, p) of the solid, of any size, NaN where too few of its keyframes show a point.
+        size_px: usual RMS radius of the images.
     """
 
     flat: Misfit
@@ -44,6 +45,7 @@ class Rigid:
     turn_degrees: float
     relief: float
     shape: Array | None = field(default=None, kw_only=True)
+    size_px: float = field(default=np.inf, kw_only=True)
 
     @property
     def proven(self) -> bool:
@@ -57,7 +59,8 @@ def rigid_by(made: tuple[Array, Mask], tested: tuple[Array, Mask], camera: Camer
     solid, flat = (bundle_adjust(*made, camera, refine_focal=False, flat=flat) for flat in (False, True))
     left = [rigid_misfit(model, *tested, camera, edges) for model in (flat, solid)]
     shape = np.where(made[1].sum(axis=0) < FEWEST_VIEWS, np.nan, solid.shape)
-    return Rigid(left[0], left[1], solid.turn_degrees, solid.relief, shape=shape)
+    size = float(np.median([np.sqrt(np.var(w[:, seen], axis=1).sum()) for w, seen in zip(*tested, strict=True)]))
+    return Rigid(left[0], left[1], solid.turn_degrees, solid.relief, shape=shape, size_px=size)
 
 
 def rigid_misfit(model: Solid, W: Array, visible: Mask, camera: Camera, edges: Indices) -> Misfit:
@@ -75,7 +78,8 @@ def both(one: Rigid, other: Rigid) -> Rigid:
         Misfit(rms([a.edges_px, b.edges_px]), rms([a.whole_px, b.whole_px]))
         for a, b in ((one.flat, other.flat), (one.solid, other.solid))
     )
-    return Rigid(flat, solid, (one.turn_degrees + other.turn_degrees) / 2, (one.relief + other.relief) / 2, shape=one.shape)
+    turn, relief = (one.turn_degrees + other.turn_degrees) / 2, (one.relief + other.relief) / 2
+    return Rigid(flat, solid, turn, relief, shape=one.shape, size_px=one.size_px)
 
 
 def rms(values: list[float]) -> float:

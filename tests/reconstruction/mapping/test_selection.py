@@ -95,6 +95,16 @@ def test_what_leaves_least_wins_and_freedom_costs(unit):
     assert decided((0.4, 0.7), (0.3, 0.28), 0.34, turn=5.0) == "solid"  # a can that hardly turns
 
 
+def test_what_leaves_a_tenth_of_its_size_is_no_plane():
+    def decided(share, relief):
+        rigid = Rigid(Misfit(10, 12.7), Misfit(8, 11.6), 160.0, relief, size_px=12.7 / share)
+        return decide(rigid, Misfit(np.nan, np.nan), 0.0)[0]
+
+    assert decided(0.12, 0.2) == "solid"  # people, whom no solid of one shape explains either
+    assert decided(0.075, 0.2) == "flat"  # a card with much noise
+    assert decided(0.12, 0.03) == "flat"
+
+
 def test_frames_that_can_be_told_lengths_show_a_sheet():
     def decided(solid, told_px, stretch):
         return decide(Rigid(Misfit(0.72, 1.47), solid, 28.0, 0.3), Misfit(0.43, np.nan), stretch, told_px)[0]

@@ -31,9 +31,10 @@ def likeliest(
 ) -> tuple[Attempt, float]:
     """Where many modes lead to from there, or from another mean shape if that makes much likelier what keyframes show.
 
-    And how far off it (`apart`) shapes are that are about as likely. Many modes may take wrong poses for deformations, and
-    explain them; so all are compared by few modes and few points: what has been found by many, told by few, with what few
-    find themselves. Mean shapes are the rigid one, by factorisation (`low_rank`), or shallower.
+    And how far apart (`apart`) shapes are that few modes find about as likely.
+
+    Many modes explain wrong poses by deformations. So all are compared by few modes and few points: what many have found,
+    told by few, with what few find themselves. Mean shapes are the rigid one, by factorisation (`low_rank`), or shallower.
 
     Args:
         start: where learning about the rigid shape has begun.
@@ -55,12 +56,14 @@ def likeliest(
     usual = gone_on(start, *shown)
     told = gone_on(usual, *shown, USUAL_MODES, RIGHTED, FEW_POINTS)
     here = each(try_one, flatter)
-    others = [one for one in (*elsewhere.result(), *here) if one]
-    best = min(others, key=lambda one: one.unlikeliness, default=told)
-    best = best if best.unlikeliness < told.unlikeliness - LIKELIER else told
-    alike = [one for one in (told, *others) if one.unlikeliness < best.unlikeliness + ALIKE]
-    otherwise = max(apart(best.known.shapes, one.known.shapes, mirrored=not camera.perspective) for one in alike)
-    return usual if best is told else gone_on(best, *shown), otherwise
+    finds = [one for one in (*elsewhere.result(), *here) if one]
+    best = min(finds, key=lambda one: one.unlikeliness, default=told)
+    taken = best.unlikeliness < told.unlikeliness - LIKELIER
+    one = best if taken else (finds or [told])[0]  # of few modes, too: those of many differ from all of theirs
+    alike = [other for other in finds if other.unlikeliness < one.unlikeliness + ALIKE]
+    mirrored = not camera.perspective
+    otherwise = max((apart(one.known.shapes, other.known.shapes, mirrored=mirrored) for other in alike), default=0.0)
+    return gone_on(best, *shown) if taken else usual, otherwise
 
 
 def each(
