@@ -9,6 +9,7 @@ from reconstruction.basis.rest_shape import RigidMotion, apart
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.map import FEWEST_POINTS, Map
 from reconstruction.mapping.selection import PLAIN, Evidence
+from reconstruction.mapping.solid.deforming.deformations import Deformations
 from reconstruction.mapping.solid.rivals import HARDLY_TURNED
 
 FEW_POINTS = 40  # of a sheet in a usual frame: bends between fewer are a guess
@@ -24,6 +25,7 @@ FAIR_CHANGE, POOR_CHANGE = 0.031, 0.044  # the same with noise, over the radius 
 FAR_TURNED = 90.0  # degrees: views of a solid that turns farther share few points
 # Share of its changes: what nods and speaks has up to 0.66, what turns once while it swells once 0.85, who chews 0.93.
 WITH_TURN, ALL_WITH_TURN = 0.7, 0.95
+FAIR_OPEN, POOR_OPEN = 0.035, 0.05  # of its size, by which images leave shapes open: poses right, as far off as they are
 AS_LIKELY = 0.1  # of its size, that shapes about as likely are elsewhere: heads have up to 0.07, hearts 0.2
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
 OTHERWISE = 0.15  # of its size, that half of the keyframes find a solid elsewhere: those that deform have up to 0.1
@@ -139,16 +141,25 @@ def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     if off > OTHERWISE:
         told = f"half of the keyframes find it otherwise, by {off:.0%} of its size: how deep it is is a guess"
         yield Verdict(at_worst, f"{told}; film it turning more")
-    if found.deformations is not None and found.deformations.turning > WITH_TURN:
-        told = f"{found.deformations.turning:.0%} of its changes go with its turn: which is which is a guess"
-        all_of_it = found.deformations.turning > ALL_WITH_TURN
-        yield Verdict("poor" if all_of_it else at_worst, f"{told}; film it turning while it keeps its shape")
-    if found.deformations is not None and found.deformations.otherwise > AS_LIKELY:
-        told = f"shapes that are {found.deformations.otherwise:.0%} off would be about as likely: how deep it is is a guess"
-        yield Verdict("poor", f"{told}; film it turning more, while it keeps its shape")
+    if found.deformations is not None:
+        yield from of_deformations(found.deformations, at_worst)
     rare = 0.0 if found.seen is None else float((found.seen.mean(axis=0) < OFTEN).mean())
     if rare > MOST_RARE:
         yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
+
+
+def of_deformations(known: Deformations, at_worst: Grade) -> Iterator[Verdict]:
+    """What a solid's deformations say, learned from its keyframes; `at_worst`: what half of them go with its turn is."""
+    if known.left_open > FAIR_OPEN:
+        told = f"its views tell its shapes to {known.left_open:.1%} of its size only"
+        yield Verdict("poor" if known.left_open > POOR_OPEN else "fair", f"{told}; film it turning more, and longer")
+    if known.turning > WITH_TURN:
+        told = f"{known.turning:.0%} of its changes go with its turn: which is which is a guess"
+        grade: Grade = "poor" if known.turning > ALL_WITH_TURN else at_worst
+        yield Verdict(grade, f"{told}; film it turning while it keeps its shape")
+    if known.otherwise > AS_LIKELY:
+        told = f"shapes that are {known.otherwise:.0%} off would be about as likely: how deep it is is a guess"
+        yield Verdict("poor", f"{told}; film it turning more, while it keeps its shape")
 
 
 def of_sheet(found: IsometricSheet, evidence: Evidence, *, perspective: bool) -> Iterator[Verdict]:

@@ -177,6 +177,14 @@ def test_shapes_far_off_that_would_be_as_likely(otherwise: float, grade: str) ->
     assert ("shapes that are 15% off would be about as likely" in said.reason) == (grade == "poor")
 
 
+@pytest.mark.parametrize(("left_open", "grade"), [(0.03, "good"), (0.042, "fair"), (0.075, "poor")])
+def test_what_its_views_leave_open(left_open: float, grade: str) -> None:
+    deformations = Deformations(np.eye(3), 0.01, left_open=left_open)
+    said = verdict(course([0.001] * 50), replace(SOLID, deformations=deformations))
+    assert said.grade == grade
+    assert (f"tell its shapes to {left_open:.1%} of its size only" in said.reason) == (grade != "good")
+
+
 @pytest.mark.parametrize(("keyframes", "grade"), [(30, "good"), (60, "fair")])
 def test_points_that_few_keyframes_show_have_no_place(keyframes: int, grade: str) -> None:
     seen = np.ones((keyframes, 27), bool)

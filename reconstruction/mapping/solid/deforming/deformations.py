@@ -22,12 +22,14 @@ class Deformations:
         noise: standard deviation of a coordinate of an image point, over the shape's size.
         turning: share of the keyframes' Λ' that goes with their turn, so that which is which is a guess.
         otherwise: how far off shapes are, as a share of their size, that make the keyframes about as likely.
+        left_open: what images leave open: standard deviation of a point of a keyframe's shape, RMS, over its size.
     """
 
     covariance: Array
     noise: float
     turning: float = 0.0
     otherwise: float = 0.0
+    left_open: float = 0.0
 
     def pull(self, points: int) -> Pull:
         """What it adds to the energy of a frame of so many points."""

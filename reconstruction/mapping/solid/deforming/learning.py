@@ -59,4 +59,5 @@ def learned(
         h = visible * robust(found.deformations.noise).weight((off**2).sum(axis=1))
         B[:3] += shifts(seen, off, h, found.state, model.focal)
     B[:3] = without_new_spikes(B[:3], model.B[:3], visible)
-    return replace(found, B=B, unlikeliness=learning.unlikeliness(found))
+    told = replace(found.deformations, left_open=learning.left_open(found))
+    return replace(found, B=B, deformations=told, unlikeliness=learning.unlikeliness(found))

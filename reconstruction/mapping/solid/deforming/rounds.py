@@ -98,6 +98,16 @@ class Rounds:
         volumes = np.linalg.slogdet(H)[1].sum() + len(H) * np.linalg.slogdet(covariance)[1]
         return float((at_best + volumes / 2) / self._visible.sum() + 2 * np.log(noise))
 
+    def left_open(self, known: Learned) -> float:
+        """Standard deviation of a point of a keyframe's shape, RMS, over the rest shape's size: what images leave open."""
+        every, precision = slice(None), inverted(known.deformations.covariance)
+        h = self._left_over(known, every)[2]
+        unsure = expected(*self._normal(known, precision, h, every), known.state, precision)[1]
+        shape, modes = known.B[:3], known.B[3:-1]
+        r = len(modes)
+        of_modes = np.trace(unsure.reshape(3, r, 3, r), axis1=0, axis2=2)
+        return float(np.sqrt(((of_modes @ modes) * modes).sum(axis=0).mean() / shape.var(axis=1).sum()))
+
     def _left_over(self, known: Learned, frames: slice) -> tuple[Array, Array, Array]:
         """Residuals (n, 2, p) of the frames that `known` has, their squared lengths (n, p), and robust weights (n, p)."""
         off = residuals(known.B[:, self._some], self._seen[frames], known.state.matrices(), self._focal)
