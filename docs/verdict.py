@@ -127,6 +127,7 @@ def page(cases: list[Case]) -> str:
             "those on solids that change by heads and hearts, those here among them; "
             "that on solids that a sheet would explain better by flags, those here among them; "
             "that on shapes as likely by the same kinds, of other seeds; "
+            "that on what views tell by boxes that open, those here among them; "
             "those on what looks otherwise by videos alone.\n",
             markdown_table(columns, [row(grade, held_back) for grade in reversed(GRADES)]),
             "All of them, best first:\n",
