@@ -61,7 +61,7 @@ def with_deformations(
             return found
         start, shown, otherwise = Attempt(model, trial, first.log_s), (rigid, settings, W, visible, sound), 0.0
         if last:
-            end, otherwise = likeliest(start, *shown, begin)
+            end, otherwise = likeliest(start, *shown, frames[order], begin)
         else:
             end = gone_on(start, *shown, MORE_MODES, FEW_ROUNDS)
     except np.linalg.LinAlgError:  # of points that lie as none do

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from reconstruction.arrays import Array, Mask
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.rest_shape import RigidMotion, apart
 from reconstruction.camera import nearest_rotation
 from reconstruction.mapping.factorization import rotations_from_rows
@@ -16,6 +16,7 @@ from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.deforming.attempt import Attempt, begun, gone_on
 from reconstruction.mapping.solid.deforming.learning import RIGHTED, ROUNDS, learned
 from reconstruction.mapping.solid.deforming.low_rank import posed
+from reconstruction.mapping.solid.deforming.turning import turned_on, unsteadiness
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import USUAL_MODES, Settings
 
@@ -27,7 +28,14 @@ ALIKE = 0.15  # of it: shapes that are less likely by less are to be reckoned wi
 
 
 def likeliest(
-    start: Attempt, rigid: Map, settings: Settings, W: Array, visible: Mask, sound: Mask, begin: Start = at_once
+    start: Attempt,
+    rigid: Map,
+    settings: Settings,
+    W: Array,
+    visible: Mask,
+    sound: Mask,
+    frames: Indices,
+    begin: Start = at_once,
 ) -> tuple[Attempt, float]:
     """Where many modes lead to from there, or from another mean shape if that makes much likelier what keyframes show.
 
@@ -35,6 +43,7 @@ def likeliest(
 
     Many modes explain wrong poses by deformations. So all are compared by few modes and few points: what many have found,
     told by few, with what few find themselves. Mean shapes are the rigid one, by factorisation (`low_rank`), or shallower.
+    Last comes what is learned where poses do not turn back (`turning`), if it turns more steadily and is about as likely.
 
     Args:
         start: where learning about the rigid shape has begun.
@@ -43,6 +52,7 @@ def likeliest(
         W: (K, 2, p) px; finite.
         visible: (K, p).
         sound: (K, p) of that, what is not grossly wrong.
+        frames: (K,) their numbers.
         begin: where a part of the work is done.
 
     Raises:
@@ -59,11 +69,18 @@ def likeliest(
     finds = [one for one in (*elsewhere.result(), *here) if one]
     best = min(finds, key=lambda one: one.unlikeliness, default=told)
     taken = best.unlikeliness < told.unlikeliness - LIKELIER
-    one = best if taken else (finds or [told])[0]  # of few modes, too: those of many differ from all of theirs
+    one, end = (best, gone_on(best, *shown)) if taken else (told, usual)
+    if turned := turned_on(end, *shown, frames, USUAL_MODES, FEW_POINTS):
+        finds.append(turned)
+        steadier = unsteadiness(turned.known.state, frames) < unsteadiness(end.known.state, frames)
+        if steadier and turned.unlikeliness < one.unlikeliness + LIKELIER:
+            one, end, taken = turned, gone_on(turned, *shown), True
+    if not taken and finds:
+        one = finds[0]  # of few modes by themselves: those of many differ from all of theirs
     alike = [other for other in finds if other.unlikeliness < one.unlikeliness + ALIKE]
     mirrored = not camera.perspective
     otherwise = max((apart(one.known.shapes, other.known.shapes, mirrored=mirrored) for other in alike), default=0.0)
-    return gone_on(best, *shown) if taken else usual, otherwise
+    return end, otherwise
 
 
 def each(

@@ -109,7 +109,7 @@ def test_poses_are_believed_if_they_make_images_likelier(
     found = rigid(W, visible, camera)
     model, first = begun(found, Settings(), W, visible, visible, 20)
     start = Attempt(model, learned(model, W, visible, first, first.log_s, RIGHTED), first.log_s)
-    other, otherwise = likeliest(start, found, Settings(), W, visible, visible)
+    other, otherwise = likeliest(start, found, Settings(), W, visible, visible, np.arange(K))
     usual = gone_on(start, found, Settings(), W, visible, visible)
     assert (otherwise < 0.1) == sure
     errors = []
@@ -140,6 +140,6 @@ def test_what_shrinks_while_it_turns_hardly_may_be_of_another_depth() -> None:
     found = rigid(W, visible, ORTHOGRAPHIC)
     model, first = begun(found, Settings(), W, visible, visible, 20)
     start = Attempt(model, learned(model, W, visible, first, first.log_s, RIGHTED), first.log_s)
-    otherwise = likeliest(start, found, Settings(), W, visible, visible)[1]
+    otherwise = likeliest(start, found, Settings(), W, visible, visible, np.arange(K))[1]
     assert otherwise > 0.1
-    assert likeliest(start, found, Settings(), W, visible, visible, elsewhere)[1] == otherwise
+    assert likeliest(start, found, Settings(), W, visible, visible, np.arange(K), elsewhere)[1] == otherwise

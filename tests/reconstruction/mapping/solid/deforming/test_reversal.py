@@ -26,7 +26,7 @@ EVERYTHING = np.ones((K, P), np.bool_)
 REVERSED = slice(12, 17)
 
 
-def fish(camera: Camera) -> tuple[Array, Array, Map, Model, State]:
+def fish(camera: Camera, reverse: slice = REVERSED) -> tuple[Array, Array, Map, Model, State]:
     """A fish that turns once around and beats its tail: images, shapes (K, 3, P), and its rigid shape in all poses.
 
     The poses of some frames in a row are mirrored, as by a rigid shape that beats it the other way.
@@ -44,7 +44,7 @@ def fish(camera: Camera) -> tuple[Array, Array, Map, Model, State]:
     W, placed = seen(shapes, R, camera)
     W += 0.1 * rng.normal(size=W.shape)
     half_turn = np.diag([-1.0, -1.0, 1.0])
-    R[REVERSED] = half_turn @ R[REVERSED] @ half_turn
+    R[reverse] = half_turn @ R[reverse] @ half_turn
     rigid = Map(RestShape("rigid", RigidMotion(rest, R, np.ones(K), np.zeros((K, 2))), "made here"), camera)
     model = modelled(rigid, Settings(), W, EVERYTHING)
     hardly = 1e-3 * rng.normal(size=(K, 3, len(model.basis.eigenvalues)))

@@ -1,0 +1,129 @@
+"""Stretches of a video whose poses are mirrored in depth: in them a thing that goes on turning seems to turn back.
+
+Reversed (`reversal`), it turns the other way about both axes across the line of sight, and the same way about that. Limbs
+that swing hide from the keyframes, one by one, which of the two is right; how it turned before and after tells.
+"""
+
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from reconstruction.arrays import Array, Indices, Mask
+from reconstruction.basis.model import Model
+from reconstruction.basis.rest_shape import RigidMotion
+from reconstruction.camera import quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.mapping.map import Map
+from reconstruction.mapping.solid.deforming.attempt import Attempt, modelled
+from reconstruction.mapping.solid.deforming.learning import learned
+from reconstruction.mapping.solid.deforming.reversal import in_reverse
+from reconstruction.mapping.solid.deforming.rounds import shifts
+from reconstruction.mapping.solid.placing import well_spread
+from reconstruction.settings import Settings
+from reconstruction.state import State, join
+from reconstruction.window.energy import build_energy
+from reconstruction.window.solver import Solver, minimise
+from reconstruction.window.statistics import image_statistics, residuals
+
+MIRROR = np.array([-1.0, -1.0, 1.0])  # of a velocity of turning, in camera axes
+WILD = 2.5  # times the usual speed: a step across the place where poses are reversed says nothing
+RELUCTANT = 0.3  # of the usual speed, that a change of sides must gain
+SWEEPS = 2  # of the mean shape, whose depth moves images in perspective
+
+
+def unsteadiness(state: State, frames: Indices) -> float:
+    """How much the velocity of turning of keyframes in the order of time changes from step to step, over its usual size.
+
+    Args:
+        state: their poses (n = K).
+        frames: (K,) their numbers.
+    """
+    velocity, usual = tame_steps(state, frames)[1:]
+    return float(np.linalg.norm(np.diff(velocity, axis=0), axis=1).mean() / usual)
+
+
+def turning_back(state: State, frames: Indices) -> Mask:
+    """Which of the keyframes (K,) are to be reversed so that their velocity of turning changes least; fewer than half.
+
+    Arguments as for `unsteadiness`.
+    """
+    tame, velocity, usual = tame_steps(state, frames)
+    sides = np.stack([velocity, MIRROR * velocity], axis=1)
+    jumps = np.linalg.norm(sides[1:, :, None] - sides[:-1, None], axis=3)  # (n - 1, side, side before)
+    jumps += RELUCTANT * usual * (1 - np.eye(2))
+    total, before = np.zeros(2), list[Indices]()
+    for jump in jumps:
+        before.append((jump + total).argmin(axis=1))
+        total = (jump + total).min(axis=1)
+    side = [int(total.argmin())]
+    for best in before[::-1]:
+        side.append(int(best[side[-1]]))
+    of_keyframes = np.searchsorted(tame, np.arange(len(frames))).clip(max=len(tame) - 1)
+    back = np.array(side[::-1], np.bool_)[of_keyframes]
+    return back if back.mean() <= 0.5 else ~back
+
+
+def tame_steps(state: State, frames: Indices) -> tuple[Indices, Array, float]:
+    """The steps (n,) from keyframe to keyframe that are no wild ones, how it turns in them (n, 3), and its usual speed."""
+    R = rotation_from_quaternion(state.q)
+    velocity = Rotation.from_matrix(R[1:] @ R[:-1].transpose(0, 2, 1)).as_rotvec() / np.diff(frames)[:, None]
+    speed = np.linalg.norm(velocity, axis=1)
+    usual = max(float(np.median(speed)), np.finfo(float).tiny)
+    tame = np.flatnonzero(speed <= WILD * usual)
+    return tame, velocity[tame], usual
+
+
+def turned_on(
+    attempt: Attempt,
+    rigid: Map,
+    settings: Settings,
+    W: Array,
+    visible: Mask,
+    sound: Mask,
+    frames: Indices,
+    modes: int,
+    points: int,
+) -> Attempt | None:
+    """What is learned anew where no keyframe turns back, by the mean shape that suits such poses; None if none does now.
+
+    Args:
+        attempt: what tells how it turns.
+        rigid: the map of keyframes, in their order.
+        settings: how to reconstruct.
+        W: (K, 2, p) px; finite.
+        visible: (K, p).
+        sound: (K, p) of that, what is not grossly wrong.
+        frames: (K,) their numbers.
+        modes: how many.
+        points: at most, by which it is learned.
+    """
+    model, state, B = attempt.model, attempt.known.state, attempt.known.B.copy()
+    back = turning_back(state, frames)
+    if not back.any():
+        return None
+    reversed_ = in_reverse(state)
+    state = join([(reversed_ if turns else state)[k : k + 1] for k, turns in enumerate(back)])
+    state, seen = replace(state, Lambda=np.zeros_like(state.Lambda)), model.normalised(W)
+    for _ in range(SWEEPS):
+        off = residuals(B, seen, state.matrices(), model.focal)
+        B[:3] += shifts(seen, off, sound.astype(np.float64), state, model.focal)
+    with suppress(np.linalg.LinAlgError):
+        found = replace(attempt, known=replace(attempt.known, B=B, state=state)).about(rigid)
+        again = modelled(found, settings, W, sound, modes)
+        log_s = attempt.log_s + np.log(model.scale / again.scale)
+        first = deformed(again, found.rest.motion, settings, W, sound, points)
+        return Attempt(again, learned(again, W, visible, first, log_s, points=points), log_s)
+    return None
+
+
+def deformed(model: Model, motion: RigidMotion, settings: Settings, W: Array, sound: Mask, points: int) -> State:
+    """Pose and Λ' of each keyframe by itself, from the pose it has (`motion`); other arguments as for `turned_on`."""
+    some = well_spread(model.B[:3], sound, points)
+    few = model.of_points(some)
+    energy = build_energy(few, "general", settings.priors)
+    q = quaternion_from_rotation(motion.R @ model.basis.Phi)
+    t, log_s = motion.t / model.radius_px, np.log(motion.s / model.scale)
+    start = State(q, t, log_s, np.zeros((len(W), 3, len(model.basis.eigenvalues))))
+    data = [image_statistics(few, w[:, some], h[some].astype(np.float64)) for w, h in zip(W, sound, strict=True)]
+    return join([minimise(energy, one, start[k : k + 1], None, Solver()).state for k, one in enumerate(data)])
