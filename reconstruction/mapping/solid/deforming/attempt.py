@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reconstruction.arrays import Array, Mask
+from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import quaternion_from_rotation, rotation_from_quaternion
@@ -18,6 +18,31 @@ from reconstruction.settings import MOST_MODES, Settings
 from reconstruction.state import State, join
 from reconstruction.window.energy import build_energy
 from reconstruction.window.window import SlidingWindow
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Keyframes in the order of time, and how to reconstruct them.
+
+    Attributes:
+        rigid: the map of them, nothing deformed.
+        settings: how to reconstruct.
+        W: (K, 2, p) px; finite.
+        visible: (K, p).
+        sound: (K, p) of that, what is not grossly wrong.
+        frames: (K,) their numbers.
+    """
+
+    rigid: Map
+    settings: Settings
+    W: Array
+    visible: Mask
+    sound: Mask
+    frames: Indices
+
+    def learned(self, model: Model, state: State, log_s: Array, rounds: int = ROUNDS, points: int = POINTS) -> Learned:
+        """What they tell; arguments as for `learning.learned`, which says what is raised."""
+        return learned(model, self.W, self.visible, state, log_s, rounds, points)
 
 
 @dataclass(frozen=True)
@@ -63,54 +88,39 @@ class Attempt:
         )
 
 
-def gone_on(
-    attempt: Attempt,
-    found: Map,
-    settings: Settings,
-    W: Array,
-    visible: Mask,
-    sound: Mask,
-    modes: int = MOST_MODES,
-    rounds: int = ROUNDS,
-    points: int = POINTS,
-) -> Attempt:
+def gone_on(attempt: Attempt, shown: Shown, modes: int = MOST_MODES, rounds: int = ROUNDS, points: int = POINTS) -> Attempt:
     """Where it leads to, by so many modes made anew: poses learned so far tell better what moves together.
 
-    Arguments as for `begun` and `learned`, which says what is raised.
+    Arguments as for `learned`, which says what is raised.
     """
-    again = modelled(attempt.about(found), settings, W, sound, modes)
+    again = modelled(attempt.about(shown.rigid), shown, modes)
     log_s = attempt.log_s + np.log(attempt.model.scale / again.scale)  # else each attempt would let them go further
-    return Attempt(again, learned(again, W, visible, attempt.carried(again), log_s, rounds, points), log_s)
+    return Attempt(again, shown.learned(again, attempt.carried(again), log_s, rounds, points), log_s)
 
 
-def modelled(found: Map, settings: Settings, W: Array, sound: Mask, modes: int = MOST_MODES) -> Model:
-    """Modes by what moves together, for keyframes in their order; arguments as for `begun`."""
+def modelled(found: Map, shown: Shown, modes: int = MOST_MODES) -> Model:
+    """Modes by what moves together."""
     motion = found.rest.motion
-    apart = own_motion((seen_by(found.camera, motion) - W) / motion.s[:, None, None], sound)
-    return replace(found, modes=modes, model=None).modelled(settings, own_motion=apart)
+    apart = own_motion((seen_by(found.camera, motion) - shown.W) / motion.s[:, None, None], shown.sound)
+    return replace(found, modes=modes, model=None).modelled(shown.settings, own_motion=apart)
 
 
-def begun(
-    found: Map, settings: Settings, W: Array, visible: Mask, sound: Mask, modes: int = MOST_MODES, points: int = POINTS
-) -> tuple[Model, State]:
+def begun(found: Map, shown: Shown, modes: int = MOST_MODES, points: int = POINTS) -> tuple[Model, State]:
     """Modes by what moves together, and pose and Λ' of each keyframe by itself.
 
     Args:
         found: the map of keyframes, in their order.
-        settings: how to reconstruct.
-        W: (K, 2, p) px; finite.
-        visible: (K, p).
-        sound: (K, p) of that, what is not grossly wrong.
+        shown: these.
         modes: how many.
         points: at most, by which poses are found.
     """
-    motion, model = found.rest.motion, modelled(found, settings, W, sound, modes)
-    some = well_spread(model.B[:3], visible, points)
+    motion, model = found.rest.motion, modelled(found, shown, modes)
+    some = well_spread(model.B[:3], shown.visible, points)
     few = model.of_points(some)
-    energy = build_energy(few, "general", settings.priors)
-    window = SlidingWindow(few, energy, settings.window, replace(motion, shape=motion.shape[:, some]))
+    energy = build_energy(few, "general", shown.settings.priors)
+    window = SlidingWindow(few, energy, shown.settings.window, replace(motion, shape=motion.shape[:, some]))
     states = []
-    for one, seen in zip(W[:, :, some], visible[:, some], strict=True):
+    for one, seen in zip(shown.W[:, :, some], shown.visible[:, some], strict=True):
         window.advance(one, seen)
         assert window.state is not None
         states.append(window.state[-1:])

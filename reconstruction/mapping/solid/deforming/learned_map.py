@@ -9,7 +9,7 @@ from reconstruction.basis.model import Model
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.bundle import seen_by
-from reconstruction.mapping.solid.deforming.attempt import Attempt, begun, gone_on
+from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, begun, gone_on
 from reconstruction.mapping.solid.deforming.deformations import Learned
 from reconstruction.mapping.solid.deforming.learning import RIGHTED, learned
 from reconstruction.mapping.solid.deforming.starts import likeliest
@@ -54,16 +54,17 @@ def with_deformations(
     W, visible = np.where(visible[:, None], W, 0.0)[order], visible[order]
     sound, rigid = without_outliers(W, visible), found.in_order(order)
     try:
-        model, first = begun(rigid, settings, W, visible, sound, MOST_MODES if last else MORE_MODES)
+        shown = Shown(rigid, settings, W, visible, sound, frames[order])
+        model, first = begun(rigid, shown, MOST_MODES if last else MORE_MODES)
         hidden = sound & (np.random.default_rng(0).random(visible.shape) < HIDDEN)
         trial = learned(model, W, visible & ~hidden, first, first.log_s, TRIAL)
         if not predicted(model, W, hidden, trial, rigid):
             return found
-        start, shown, otherwise = Attempt(model, trial, first.log_s), (rigid, settings, W, visible, sound), 0.0
+        start, otherwise = Attempt(model, trial, first.log_s), 0.0
         if last:
-            end, otherwise = likeliest(start, *shown, frames[order], begin)
+            end, otherwise = likeliest(start, shown, begin)
         else:
-            end = gone_on(start, *shown, MORE_MODES, FEW_ROUNDS)
+            end = gone_on(start, shown, MORE_MODES, FEW_ROUNDS)
     except np.linalg.LinAlgError:  # of points that lie as none do
         return found
     known = end.about(rigid)

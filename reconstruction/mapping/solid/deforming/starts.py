@@ -7,18 +7,16 @@ from functools import partial
 
 import numpy as np
 
-from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.rest_shape import RigidMotion, apart
 from reconstruction.camera import nearest_rotation
 from reconstruction.mapping.factorization import rotations_from_rows
-from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.bundle import Bundle
-from reconstruction.mapping.solid.deforming.attempt import Attempt, begun, gone_on
-from reconstruction.mapping.solid.deforming.learning import RIGHTED, ROUNDS, learned
+from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, begun, gone_on
+from reconstruction.mapping.solid.deforming.learning import RIGHTED
 from reconstruction.mapping.solid.deforming.low_rank import posed
 from reconstruction.mapping.solid.deforming.turning import turned_on, unsteadiness
 from reconstruction.mapping.start import Start, at_once
-from reconstruction.settings import USUAL_MODES, Settings
+from reconstruction.settings import USUAL_MODES
 
 STARTS = (2, 10.0), (4, 10.0), (2, 1e3), (3, 1e3)  # so many shapes; points so many deviations off may be wrong, or swing
 FEW_POINTS = 100  # by which it is seen whether they have
@@ -27,16 +25,7 @@ LIKELIER = 0.1  # of minus the log likelihood of an image point: less is for err
 ALIKE = 0.15  # of it: shapes that are less likely by less are to be reckoned with
 
 
-def likeliest(
-    start: Attempt,
-    rigid: Map,
-    settings: Settings,
-    W: Array,
-    visible: Mask,
-    sound: Mask,
-    frames: Indices,
-    begin: Start = at_once,
-) -> tuple[Attempt, float]:
+def likeliest(start: Attempt, shown: Shown, begin: Start = at_once) -> tuple[Attempt, float]:
     """Where many modes lead to from there, or from another mean shape if that makes much likelier what keyframes show.
 
     And how far apart (`apart`) shapes are that few modes find about as likely.
@@ -47,34 +36,29 @@ def likeliest(
 
     Args:
         start: where learning about the rigid shape has begun.
-        rigid: the map of keyframes, in their order.
-        settings: how to reconstruct.
-        W: (K, 2, p) px; finite.
-        visible: (K, p).
-        sound: (K, p) of that, what is not grossly wrong.
-        frames: (K,) their numbers.
+        shown: the keyframes.
         begin: where a part of the work is done.
 
     Raises:
         LinAlgError: no Gaussian holds the points.
     """
-    motion, camera, shown = rigid.rest.motion, rigid.camera, (rigid, settings, W, visible, sound)
-    seen = W - camera.center_px[:, None], visible, Bundle(motion, 1 / camera.focal_px)
-    try_one = partial(tried, *shown)
+    motion, camera = shown.rigid.rest.motion, shown.rigid.camera
+    seen = shown.W - camera.center_px[:, None], shown.visible, Bundle(motion, 1 / camera.focal_px)
+    try_one = partial(tried, shown)
     first, *flatter = [partial(shallower, motion, depth) for depth in DEPTHS]
     elsewhere = begin(each, try_one, [first, *(partial(posed, *seen, *one) for one in STARTS)])
-    usual = gone_on(start, *shown)
-    told = gone_on(usual, *shown, USUAL_MODES, RIGHTED, FEW_POINTS)
+    usual = gone_on(start, shown)
+    told = gone_on(usual, shown, USUAL_MODES, RIGHTED, FEW_POINTS)
     here = each(try_one, flatter)
     finds = [one for one in (*elsewhere.result(), *here) if one]
     best = min(finds, key=lambda one: one.unlikeliness, default=told)
     taken = best.unlikeliness < told.unlikeliness - LIKELIER
-    one, end = (best, gone_on(best, *shown)) if taken else (told, usual)
-    if turned := turned_on(end, *shown, frames, USUAL_MODES, FEW_POINTS):
+    one, end = (best, gone_on(best, shown)) if taken else (told, usual)
+    if turned := turned_on(end, shown, USUAL_MODES, FEW_POINTS):
         finds.append(turned)
-        steadier = unsteadiness(turned.known.state, frames) < unsteadiness(end.known.state, frames)
+        steadier = unsteadiness(turned.known.state, shown.frames) < unsteadiness(end.known.state, shown.frames)
         if steadier and turned.unlikeliness < one.unlikeliness + LIKELIER:
-            one, end, taken = turned, gone_on(turned, *shown), True
+            one, end, taken = turned, gone_on(turned, shown), True
     if not taken and finds:
         one = finds[0]  # of few modes by themselves: those of many differ from all of theirs
     alike = [other for other in finds if other.unlikeliness < one.unlikeliness + ALIKE]
@@ -90,14 +74,13 @@ def each(
     return [make(mean) for mean in means]
 
 
-def tried(
-    rigid: Map, settings: Settings, W: Array, visible: Mask, sound: Mask, mean: Callable[[], RigidMotion]
-) -> Attempt | None:
+def tried(shown: Shown, mean: Callable[[], RigidMotion]) -> Attempt | None:
     """What few modes and points tell about another mean shape; None if no Gaussian holds the points."""
     with suppress(np.linalg.LinAlgError):
+        rigid = shown.rigid
         found = replace(rigid, rest=replace(rigid.rest, motion=mean()), model=None)
-        model, first = begun(found, settings, W, visible, sound, USUAL_MODES, FEW_POINTS)
-        return Attempt(model, learned(model, W, visible, first, first.log_s, ROUNDS, FEW_POINTS), first.log_s)
+        model, first = begun(found, shown, USUAL_MODES, FEW_POINTS)
+        return Attempt(model, shown.learned(model, first, first.log_s, points=FEW_POINTS), first.log_s)
     return None
 
 

@@ -14,13 +14,10 @@ from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import quaternion_from_rotation, rotation_from_quaternion
-from reconstruction.mapping.map import Map
-from reconstruction.mapping.solid.deforming.attempt import Attempt, modelled
-from reconstruction.mapping.solid.deforming.learning import learned
+from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, modelled
 from reconstruction.mapping.solid.deforming.reversal import in_reverse
 from reconstruction.mapping.solid.deforming.rounds import shifts
 from reconstruction.mapping.solid.placing import well_spread
-from reconstruction.settings import Settings
 from reconstruction.state import State, join
 from reconstruction.window.energy import build_energy
 from reconstruction.window.solver import Solver, minimise
@@ -74,56 +71,42 @@ def tame_steps(state: State, frames: Indices) -> tuple[Indices, Array, float]:
     return tame, velocity[tame], usual
 
 
-def turned_on(
-    attempt: Attempt,
-    rigid: Map,
-    settings: Settings,
-    W: Array,
-    visible: Mask,
-    sound: Mask,
-    frames: Indices,
-    modes: int,
-    points: int,
-) -> Attempt | None:
+def turned_on(attempt: Attempt, shown: Shown, modes: int, points: int) -> Attempt | None:
     """What is learned anew where no keyframe turns back, by the mean shape that suits such poses; None if none does now.
 
     Args:
         attempt: what tells how it turns.
-        rigid: the map of keyframes, in their order.
-        settings: how to reconstruct.
-        W: (K, 2, p) px; finite.
-        visible: (K, p).
-        sound: (K, p) of that, what is not grossly wrong.
-        frames: (K,) their numbers.
+        shown: the keyframes.
         modes: how many.
         points: at most, by which it is learned.
     """
     model, state, B = attempt.model, attempt.known.state, attempt.known.B.copy()
-    back = turning_back(state, frames)
+    back = turning_back(state, shown.frames)
     if not back.any():
         return None
-    reversed_ = in_reverse(state)
-    state = join([(reversed_ if turns else state)[k : k + 1] for k, turns in enumerate(back)])
-    state, seen = replace(state, Lambda=np.zeros_like(state.Lambda)), model.normalised(W)
+    in_depth = in_reverse(state)
+    state = join([(in_depth if turns else state)[k : k + 1] for k, turns in enumerate(back)])
+    state, seen = replace(state, Lambda=np.zeros_like(state.Lambda)), model.normalised(shown.W)
     for _ in range(SWEEPS):
         off = residuals(B, seen, state.matrices(), model.focal)
-        B[:3] += shifts(seen, off, sound.astype(np.float64), state, model.focal)
+        B[:3] += shifts(seen, off, shown.sound.astype(np.float64), state, model.focal)
     with suppress(np.linalg.LinAlgError):
-        found = replace(attempt, known=replace(attempt.known, B=B, state=state)).about(rigid)
-        again = modelled(found, settings, W, sound, modes)
+        found = replace(attempt, known=replace(attempt.known, B=B, state=state)).about(shown.rigid)
+        again = modelled(found, shown, modes)
         log_s = attempt.log_s + np.log(model.scale / again.scale)
-        first = deformed(again, found.rest.motion, settings, W, sound, points)
-        return Attempt(again, learned(again, W, visible, first, log_s, points=points), log_s)
+        first = deformed(again, found.rest.motion, shown, points)
+        return Attempt(again, shown.learned(again, first, log_s, points=points), log_s)
     return None
 
 
-def deformed(model: Model, motion: RigidMotion, settings: Settings, W: Array, sound: Mask, points: int) -> State:
-    """Pose and Λ' of each keyframe by itself, from the pose it has (`motion`); other arguments as for `turned_on`."""
-    some = well_spread(model.B[:3], sound, points)
+def deformed(model: Model, motion: RigidMotion, shown: Shown, points: int) -> State:
+    """Pose and Λ' of each keyframe by itself, from the pose it has (`motion`), by so many points at most."""
+    some = well_spread(model.B[:3], shown.sound, points)
     few = model.of_points(some)
-    energy = build_energy(few, "general", settings.priors)
+    energy = build_energy(few, "general", shown.settings.priors)
     q = quaternion_from_rotation(motion.R @ model.basis.Phi)
     t, log_s = motion.t / model.radius_px, np.log(motion.s / model.scale)
-    start = State(q, t, log_s, np.zeros((len(W), 3, len(model.basis.eigenvalues))))
-    data = [image_statistics(few, w[:, some], h[some].astype(np.float64)) for w, h in zip(W, sound, strict=True)]
+    start = State(q, t, log_s, np.zeros((len(q), 3, len(model.basis.eigenvalues))))
+    weights = shown.sound[:, some].astype(np.float64)
+    data = [image_statistics(few, w, h) for w, h in zip(shown.W[:, :, some], weights, strict=True)]
     return join([minimise(energy, one, start[k : k + 1], None, Solver()).state for k, one in enumerate(data)])

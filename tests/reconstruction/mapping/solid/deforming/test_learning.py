@@ -11,7 +11,7 @@ from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map, map_of
 from reconstruction.mapping.mapper import on_the_way
 from reconstruction.mapping.solid.deforming import learned_map, rounds
-from reconstruction.mapping.solid.deforming.attempt import begun
+from reconstruction.mapping.solid.deforming.attempt import Shown, begun
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations
 from reconstruction.mapping.solid.deforming.learning import POINTS, learned
 from reconstruction.mapping.solid.solid import bundle_adjust
@@ -44,6 +44,10 @@ def mapped(W: Array, visible: Mask, camera: Camera) -> Map:
     return Map(RestShape("rigid", solid.motion, "made here"), solid.camera)
 
 
+def shown(rigid: Map, W: Array, visible: Mask) -> Shown:
+    return Shown(rigid, Settings(), W, visible, visible, FRAMES)
+
+
 def turned(B: Array, state: State) -> Array:
     return state.scaled_rotations() @ (B[:3] + state.Lambda @ B[3:-1])
 
@@ -52,7 +56,7 @@ def turned(B: Array, state: State) -> Array:
 def test_depth_of_deformations_is_learned(camera: Camera) -> None:
     shapes, W, visible = keyframes(0.06, camera)
     found = mapped(W, visible, camera)
-    model, before = begun(found, Settings(), W, visible, visible)
+    model, before = begun(found, shown(found, W, visible))
     after = learned(model, W, visible, before, before.log_s)
     errors = [e3d(turned(B, state), shapes).mean() for B, state in ((model.B, before), (after.B, after.state))]
     assert errors[1] < 0.75 * errors[0]
@@ -61,7 +65,7 @@ def test_depth_of_deformations_is_learned(camera: Camera) -> None:
 def test_it_takes_fewer_rounds_since_two_tell_where_they_lead_to(monkeypatch: pytest.MonkeyPatch) -> None:
     shapes, W, visible = keyframes(0.06)
     found = mapped(W, visible, PERSPECTIVE)
-    model, before = begun(found, Settings(), W, visible, visible)
+    model, before = begun(found, shown(found, W, visible))
     quick = learned(model, W, visible, before, before.log_s, rounds=16)
     monkeypatch.setattr(rounds, "extrapolated", lambda *path: path[-1])
     slow = learned(model, W, visible, before, before.log_s, rounds=16)
@@ -72,7 +76,7 @@ def test_it_takes_fewer_rounds_since_two_tell_where_they_lead_to(monkeypatch: py
 def test_dense_points_are_placed_by_those_they_are_learned_from() -> None:
     shapes, W, visible = keyframes(0.06, points=POINTS + 200)
     found = mapped(W, visible, PERSPECTIVE)
-    model, before = begun(found, Settings(), W, visible, visible)
+    model, before = begun(found, shown(found, W, visible))
     after = learned(model, W, visible, before, before.log_s, rounds=20)
     assert e3d(turned(after.B, after.state), shapes).mean() < 0.9 * e3d(turned(model.B, before), shapes).mean()
 

@@ -14,7 +14,7 @@ from reconstruction.camera import Camera, nearest_rotation
 from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.bundle import Bundle
-from reconstruction.mapping.solid.deforming.attempt import Attempt, begun, gone_on
+from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, begun, gone_on
 from reconstruction.mapping.solid.deforming.learning import POINTS, RIGHTED, learned
 from reconstruction.mapping.solid.deforming.low_rank import posed
 from reconstruction.mapping.solid.deforming.starts import likeliest, shallower
@@ -107,10 +107,11 @@ def test_poses_are_believed_if_they_make_images_likelier(
 ) -> None:
     _, shapes, W, visible = person(camera, swing, seed)
     found = rigid(W, visible, camera)
-    model, first = begun(found, Settings(), W, visible, visible, 20)
+    shown = Shown(found, Settings(), W, visible, visible, np.arange(K))
+    model, first = begun(found, shown, 20)
     start = Attempt(model, learned(model, W, visible, first, first.log_s, RIGHTED), first.log_s)
-    other, otherwise = likeliest(start, found, Settings(), W, visible, visible, np.arange(K))
-    usual = gone_on(start, found, Settings(), W, visible, visible)
+    other, otherwise = likeliest(start, shown)
+    usual = gone_on(start, shown)
     assert (otherwise < 0.1) == sure
     errors = []
     for one in (usual, other):
@@ -138,8 +139,9 @@ def test_what_shrinks_while_it_turns_hardly_may_be_of_another_depth() -> None:
     W, _ = seen(shape * shrinking, turns(K, 8.0), ORTHOGRAPHIC)
     W, visible = W + 0.2 * rng.normal(size=W.shape), np.ones((K, P), bool)
     found = rigid(W, visible, ORTHOGRAPHIC)
-    model, first = begun(found, Settings(), W, visible, visible, 20)
+    shown = Shown(found, Settings(), W, visible, visible, np.arange(K))
+    model, first = begun(found, shown, 20)
     start = Attempt(model, learned(model, W, visible, first, first.log_s, RIGHTED), first.log_s)
-    otherwise = likeliest(start, found, Settings(), W, visible, visible, np.arange(K))[1]
+    otherwise = likeliest(start, shown)[1]
     assert otherwise > 0.1
-    assert likeliest(start, found, Settings(), W, visible, visible, np.arange(K), elsewhere)[1] == otherwise
+    assert likeliest(start, shown, elsewhere)[1] == otherwise

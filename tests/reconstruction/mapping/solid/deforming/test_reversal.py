@@ -13,7 +13,7 @@ from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.deforming import learning
 from reconstruction.mapping.solid.deforming import rounds as em
-from reconstruction.mapping.solid.deforming.attempt import Attempt, modelled
+from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, modelled
 from reconstruction.mapping.solid.deforming.learning import learned
 from reconstruction.mapping.solid.deforming.reversal import in_reverse, righted
 from reconstruction.mapping.solid.deforming.rounds import Rounds
@@ -46,10 +46,14 @@ def fish(camera: Camera, reverse: slice = REVERSED) -> tuple[Array, Array, Map, 
     half_turn = np.diag([-1.0, -1.0, 1.0])
     R[reverse] = half_turn @ R[reverse] @ half_turn
     rigid = Map(RestShape("rigid", RigidMotion(rest, R, np.ones(K), np.zeros((K, 2))), "made here"), camera)
-    model = modelled(rigid, Settings(), W, EVERYTHING)
+    model = modelled(rigid, shown(rigid, W))
     hardly = 1e-3 * rng.normal(size=(K, 3, len(model.basis.eigenvalues)))
     state = State(quaternion_from_rotation(R @ model.basis.Phi), np.zeros((K, 2)), np.zeros(K), hardly)
     return W, placed, rigid, model, state
+
+
+def shown(rigid: Map, W: Array) -> Shown:
+    return Shown(rigid, Settings(), W, EVERYTHING, EVERYTHING, np.arange(K))
 
 
 def turned(B: Array, state: State) -> Array:
@@ -98,7 +102,7 @@ def test_what_is_known_is_carried_to_other_modes() -> None:
     W, _, rigid, model, state = fish(PERSPECTIVE)
     known = learned(model, W, EVERYTHING, state, state.log_s, rounds=6)
     attempt = Attempt(model, known, state.log_s)
-    again = modelled(attempt.about(rigid), Settings(), W, EVERYTHING)
+    again = modelled(attempt.about(rigid), shown(rigid, W))
     before, after = turned(known.B, known.state), turned(again.B, attempt.carried(again))
     assert e3d(after, before).max() < 0.01
     np.testing.assert_allclose(after * again.radius_px, before * model.radius_px, atol=0.02 * model.radius_px)

@@ -10,9 +10,8 @@ from reconstruction.mapping.solid.deforming.attempt import Attempt
 from reconstruction.mapping.solid.deforming.reversal import in_reverse
 from reconstruction.mapping.solid.deforming.rounds import Rounds
 from reconstruction.mapping.solid.deforming.turning import turned_on, turning_back, unsteadiness
-from reconstruction.settings import Settings
 from reconstruction.state import State, join
-from tests.reconstruction.mapping.solid.deforming.test_reversal import EVERYTHING, fish, turned
+from tests.reconstruction.mapping.solid.deforming.test_reversal import EVERYTHING, fish, shown, turned
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE
 
 K = 40
@@ -52,8 +51,8 @@ def test_what_turns_on_is_learned_anew(camera: Camera) -> None:
     W, placed, rigid, model, state = fish(camera, MIRRORED)
     rounds = Rounds(model, np.arange(W.shape[2]), model.normalised(W), EVERYTHING, state.log_s)
     before = Attempt(model, rounds.begun(model.B, state), state.log_s)
-    after = turned_on(before, rigid, Settings(), W, EVERYTHING, EVERYTHING, np.arange(K), 40, 60)
+    after = turned_on(before, shown(rigid, W), 40, 60)
     assert after is not None
     errors = [e3d(turned(one.known.B, one.known.state), placed).mean() for one in (before, after)]
     assert errors[1] < 0.3 * errors[0]
-    assert turned_on(after, rigid, Settings(), W, EVERYTHING, EVERYTHING, np.arange(K), 40, 60) is None
+    assert turned_on(after, shown(rigid, W), 40, 60) is None
