@@ -26,6 +26,7 @@ from reconstruction.window.statistics import image_statistics, residuals
 MIRROR = np.array([-1.0, -1.0, 1.0])  # of a velocity of turning, in camera axes
 WILD = 2.5  # times the usual speed: a step across the place where poses are reversed says nothing
 RELUCTANT = 0.3  # of the usual speed, that a change of sides must gain
+GOES_ROUND = np.pi / 3  # between two keyframes: what shows fewer sides may as well nod
 SWEEPS = 2  # of the mean shape, whose depth moves images in perspective
 
 
@@ -43,6 +44,8 @@ def unsteadiness(state: State, frames: Indices) -> float:
 def turning_back(state: State, frames: Indices) -> Mask:
     """Which of the keyframes (K,) are to be reversed so that their velocity of turning changes least; fewer than half.
 
+    None, if it shows few sides even then.
+
     Arguments as for `unsteadiness`.
     """
     tame, velocity, usual = tame_steps(state, frames)
@@ -58,7 +61,16 @@ def turning_back(state: State, frames: Indices) -> Mask:
         side.append(int(best[side[-1]]))
     of_keyframes = np.searchsorted(tame, np.arange(len(frames))).clip(max=len(tame) - 1)
     back = np.array(side[::-1], np.bool_)[of_keyframes]
-    return back if back.mean() <= 0.5 else ~back
+    back = back if back.mean() <= 0.5 else ~back
+    q = reversed_at(state, back).q
+    apart = 2 * np.arccos(np.abs(q @ q.T).min().clip(0, 1))
+    return back & (apart > GOES_ROUND)
+
+
+def reversed_at(state: State, back: Mask) -> State:
+    """The same with some of its keyframes (K,) reversed, undeformed there."""
+    reverse = in_reverse(state)
+    return join([(reverse if turns else state)[k : k + 1] for k, turns in enumerate(back)])
 
 
 def tame_steps(state: State, frames: Indices) -> tuple[Indices, Array, float]:
@@ -84,8 +96,7 @@ def turned_on(attempt: Attempt, shown: Shown, modes: int, points: int) -> Attemp
     back = turning_back(state, shown.frames)
     if not back.any():
         return None
-    in_depth = in_reverse(state)
-    state = join([(in_depth if turns else state)[k : k + 1] for k, turns in enumerate(back)])
+    state = reversed_at(state, back)
     state, seen = replace(state, Lambda=np.zeros_like(state.Lambda)), model.normalised(shown.W)
     for _ in range(SWEEPS):
         off = residuals(B, seen, state.matrices(), model.focal)

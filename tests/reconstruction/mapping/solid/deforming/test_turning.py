@@ -25,14 +25,10 @@ def turning(degrees: Array) -> State:
     return State(quaternion_exp(upright), np.zeros((K, 2)), np.zeros(K), np.zeros((K, 3, 1)))
 
 
-def mirrored(state: State, which: slice) -> State:
-    return join([state[: which.start], in_reverse(state[which]), state[which.stop :]])
-
-
 @pytest.mark.parametrize("frames", [FRAMES, np.arange(K)])
 def test_what_is_mirrored_for_a_while_turns_back(frames: Indices) -> None:
     state = turning(5.0 * frames)
-    wrong = mirrored(state, MIRRORED)
+    wrong = join([state[: MIRRORED.start], in_reverse(state[MIRRORED]), state[MIRRORED.stop :]])
     back = turning_back(wrong, frames)
     assert back.sum() == pytest.approx(MIRRORED.stop - MIRRORED.start, abs=1)
     assert back[MIRRORED.start + 1 : MIRRORED.stop - 1].all()
@@ -40,7 +36,9 @@ def test_what_is_mirrored_for_a_while_turns_back(frames: Indices) -> None:
 
 
 @pytest.mark.parametrize(
-    "angles", [5.0 * np.arange(K), 30 * np.sin(np.arange(K) / 10), np.zeros(K)], ids=["turns", "sways", "rests"]
+    "angles",
+    [5.0 * np.arange(K), 30 * np.sin(np.arange(K) / 10), 6 * np.abs(np.arange(K) % 8 - 4), np.zeros(K)],
+    ids=["turns", "sways", "nods in jerks", "rests"],
 )
 def test_what_turns_steadily_sways_or_rests_stays_as_it_is(angles: Array) -> None:
     assert not turning_back(turning(angles), np.arange(K)).any()
