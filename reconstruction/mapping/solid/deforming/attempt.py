@@ -87,6 +87,10 @@ class Attempt:
             deformed @ np.linalg.pinv(again.B[3:-1]),
         )
 
+    def scales(self, again: Model) -> Array:
+        """To which scales are held (K,) by another model: as before, else each attempt would let them go further."""
+        return np.asarray(self.log_s + np.log(self.model.scale / again.scale))
+
 
 def gone_on(attempt: Attempt, shown: Shown, modes: int = MOST_MODES, rounds: int = ROUNDS, points: int = POINTS) -> Attempt:
     """Where it leads to, by so many modes made anew: poses learned so far tell better what moves together.
@@ -94,7 +98,7 @@ def gone_on(attempt: Attempt, shown: Shown, modes: int = MOST_MODES, rounds: int
     Arguments as for `learned`, which says what is raised.
     """
     again = modelled(attempt.about(shown.rigid), shown, modes)
-    log_s = attempt.log_s + np.log(attempt.model.scale / again.scale)  # else each attempt would let them go further
+    log_s = attempt.scales(again)
     return Attempt(again, shown.learned(again, attempt.carried(again), log_s, rounds, points), log_s)
 
 

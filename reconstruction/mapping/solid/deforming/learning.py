@@ -52,12 +52,11 @@ def learned(
             path = [righted(path[-1], learning)]
         if len(path) == 3:
             path = [learning.further(*path) if k < rounds - 1 else path[-1]]
-    found = path[-1]
+    found = learning.judged(path[-1])
     B = found.B.copy()
     if len(some) < B.shape[1]:
         off = residuals(B, seen, found.state.matrices(), model.focal)
         h = visible * robust(found.deformations.noise).weight((off**2).sum(axis=1))
         B[:3] += shifts(seen, off, h, found.state, model.focal)
     B[:3] = without_new_spikes(B[:3], model.B[:3], visible)
-    told = replace(found.deformations, left_open=learning.left_open(found))
-    return replace(found, B=B, deformations=told, unlikeliness=learning.unlikeliness(found))
+    return replace(found, B=B)

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from reconstruction.arrays import Mask
 from reconstruction.camera import quaternion_product
 from reconstruction.mapping.solid.deforming.deformations import Learned
 from reconstruction.mapping.solid.deforming.rounds import Rounds
@@ -37,8 +38,13 @@ def righted(known: Learned, rounds: Rounds) -> Learned:
         tried = [rounds.settled(replace(known, state=one, deformations=by_others), frames, STEPS) for one in starts]
         (own, cost), (other, its_cost) = tried
         better = its_cost < cost - SURELY
-        chosen += [(other if turned else own)[k : k + 1] for k, turned in enumerate(better)]
+        chosen.append(either(own, other, better))
     return replace(known, state=join(chosen))
+
+
+def either(own: State, other: State, turned: Mask) -> State:
+    """Of two states of the same n frames the one, or the other where `turned` (n,)."""
+    return join([(other if turns else own)[k : k + 1] for k, turns in enumerate(turned)])
 
 
 def in_reverse(state: State) -> State:

@@ -90,23 +90,23 @@ class Rounds:
         scales = ((state.log_s - self._log_s[frames]) / SCALE) ** 2
         return state, images + ((Lambda @ precision * Lambda).sum(axis=1) + scales) / 2
 
-    def unlikeliness(self, known: Learned) -> float:
-        """Minus the log likelihood of the images, whatever Λ' is, over how many points they show (Laplace's way)."""
-        every, covariance, noise = slice(None), known.deformations.covariance, known.deformations.noise
-        H = self._normal(known, inverted(covariance), self._left_over(known, every)[2], every)[0]
-        at_best = self.settled(known, every, 0)[1].sum()
+    def judged(self, known: Learned) -> Learned:
+        """The same with how likely it is, and what images leave open."""
+        every, covariance = slice(None), known.deformations.covariance
+        precision = inverted(covariance)
+        H, g = self._normal(known, precision, self._left_over(known, every)[2], every)
+        told = replace(known.deformations, left_open=left_open(known.B, expected(H, g, known.state, precision)[1]))
+        return replace(known, deformations=told, unlikeliness=self._unlikeliness(known, H))
+
+    def _unlikeliness(self, known: Learned, H: Array) -> float:
+        """Minus the log likelihood of the images, whatever Λ' is, over how many points they show (Laplace's way).
+
+        By the Hessians (K, d, d) there.
+        """
+        covariance, noise = known.deformations.covariance, known.deformations.noise
+        at_best = self.settled(known, slice(None), 0)[1].sum()
         volumes = np.linalg.slogdet(H)[1].sum() + len(H) * np.linalg.slogdet(covariance)[1]
         return float((at_best + volumes / 2) / self._visible.sum() + 2 * np.log(noise))
-
-    def left_open(self, known: Learned) -> float:
-        """Standard deviation of a point of a keyframe's shape, RMS, over the rest shape's size: what images leave open."""
-        every, precision = slice(None), inverted(known.deformations.covariance)
-        h = self._left_over(known, every)[2]
-        unsure = expected(*self._normal(known, precision, h, every), known.state, precision)[1]
-        shape, modes = known.B[:3], known.B[3:-1]
-        r = len(modes)
-        of_modes = np.trace(unsure.reshape(3, r, 3, r), axis1=0, axis2=2)
-        return float(np.sqrt(((of_modes @ modes) * modes).sum(axis=0).mean() / shape.var(axis=1).sum()))
 
     def _left_over(self, known: Learned, frames: slice) -> tuple[Array, Array, Array]:
         """Residuals (n, 2, p) of the frames that `known` has, their squared lengths (n, p), and robust weights (n, p)."""
@@ -166,6 +166,19 @@ def expected(H: Array, g: Array, state: State, precision: Array) -> tuple[State,
     inverse = from_lower(total) / len(state)
     held = (inverse[POSE:, POSE:] * precision).sum() + inverse[POSE - 1, POSE - 1] / SCALE**2  # by what is known beforehand
     return state.moved(step, ALL_ROWS), inverse[POSE:, POSE:], H.shape[1] - float(held)
+
+
+def left_open(B: Array, unsure: Array) -> float:
+    """Standard deviation of a point of a keyframe's shape, RMS, over the rest shape's size.
+
+    Args:
+        B: (4 + r, p) the basis.
+        unsure: (3r, 3r) mean covariance of Λ'.
+    """
+    modes = B[3:-1]
+    r = len(modes)
+    of_modes = np.trace(unsure.reshape(3, r, 3, r), axis1=0, axis2=2)
+    return float(np.sqrt(((of_modes @ modes) * modes).sum(axis=0).mean() / B[:3].var(axis=1).sum()))
 
 
 def shifts(seen: Array, off: Array, h: Array, state: State, focal: float) -> Array:

@@ -12,10 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.model import Model
-from reconstruction.basis.rest_shape import RigidMotion
-from reconstruction.camera import quaternion_from_rotation, rotation_from_quaternion
+from reconstruction.camera import rotation_from_quaternion
 from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, modelled
-from reconstruction.mapping.solid.deforming.reversal import in_reverse
+from reconstruction.mapping.solid.deforming.reversal import either, in_reverse
 from reconstruction.mapping.solid.deforming.rounds import shifts
 from reconstruction.mapping.solid.placing import well_spread
 from reconstruction.state import State, join
@@ -62,15 +61,9 @@ def turning_back(state: State, frames: Indices) -> Mask:
     of_keyframes = np.searchsorted(tame, np.arange(len(frames))).clip(max=len(tame) - 1)
     back = np.array(side[::-1], np.bool_)[of_keyframes]
     back = back if back.mean() <= 0.5 else ~back
-    q = reversed_at(state, back).q
+    q = either(state, in_reverse(state), back).q
     apart = 2 * np.arccos(np.abs(q @ q.T).min().clip(0, 1))
     return back & (apart > GOES_ROUND)
-
-
-def reversed_at(state: State, back: Mask) -> State:
-    """The same with some of its keyframes (K,) reversed, undeformed there."""
-    reverse = in_reverse(state)
-    return join([(reverse if turns else state)[k : k + 1] for k, turns in enumerate(back)])
 
 
 def tame_steps(state: State, frames: Indices) -> tuple[Indices, Array, float]:
@@ -96,28 +89,24 @@ def turned_on(attempt: Attempt, shown: Shown, modes: int, points: int) -> Attemp
     back = turning_back(state, shown.frames)
     if not back.any():
         return None
-    state = reversed_at(state, back)
+    state = either(state, in_reverse(state), back)
     state, seen = replace(state, Lambda=np.zeros_like(state.Lambda)), model.normalised(shown.W)
     for _ in range(SWEEPS):
         off = residuals(B, seen, state.matrices(), model.focal)
         B[:3] += shifts(seen, off, shown.sound.astype(np.float64), state, model.focal)
+    undeformed = replace(attempt, known=replace(attempt.known, B=B, state=state))
     with suppress(np.linalg.LinAlgError):
-        found = replace(attempt, known=replace(attempt.known, B=B, state=state)).about(shown.rigid)
-        again = modelled(found, shown, modes)
-        log_s = attempt.log_s + np.log(model.scale / again.scale)
-        first = deformed(again, found.rest.motion, shown, points)
+        again = modelled(undeformed.about(shown.rigid), shown, modes)
+        first, log_s = deformed(again, undeformed.carried(again), shown, points), undeformed.scales(again)
         return Attempt(again, shown.learned(again, first, log_s, points=points), log_s)
     return None
 
 
-def deformed(model: Model, motion: RigidMotion, shown: Shown, points: int) -> State:
-    """Pose and Λ' of each keyframe by itself, from the pose it has (`motion`), by so many points at most."""
+def deformed(model: Model, state: State, shown: Shown, points: int) -> State:
+    """Pose and Λ' of each keyframe by itself, from where it is (n = K), by so many points at most."""
     some = well_spread(model.B[:3], shown.sound, points)
     few = model.of_points(some)
     energy = build_energy(few, "general", shown.settings.priors)
-    q = quaternion_from_rotation(motion.R @ model.basis.Phi)
-    t, log_s = motion.t / model.radius_px, np.log(motion.s / model.scale)
-    start = State(q, t, log_s, np.zeros((len(q), 3, len(model.basis.eigenvalues))))
     weights = shown.sound[:, some].astype(np.float64)
     data = [image_statistics(few, w, h) for w, h in zip(shown.W[:, :, some], weights, strict=True)]
-    return join([minimise(energy, one, start[k : k + 1], None, Solver()).state for k, one in enumerate(data)])
+    return join([minimise(energy, one, state[k : k + 1], None, Solver()).state for k, one in enumerate(data)])
