@@ -61,14 +61,18 @@ class Tracks:
 
     @classmethod
     def load(cls, path: Path) -> Self:
-        """Read an .npz file: `W` and optionally `visible` (absent: what is finite), `K`, `S_gt`, `gt_frames` (absent: all).
+        """Read an .npz file, see `of`; a TrackingError says that it is missing, or no .npz."""
+        return cls.of(_read_npz(path), path)
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, NDArray[Any]], path: Path) -> Self:
+        """Of a file's `W` and optionally `visible` (absent: what is finite), `K`, `S_gt`, `gt_frames` (absent: all).
 
         W may be a matrix (2F, P), x and y of frame after frame, and S_gt likewise (3K, P). Pixels become square.
 
         Raises:
-            TrackingError: the file is missing, is no .npz, lacks `W`, or its arrays do not fit.
+            TrackingError: there is no `W`, or the arrays do not fit.
         """
-        arrays = _read_npz(path)
         if "W" not in arrays:
             problem = f"{path} has no array W (frames, 2, points), only {_names(arrays)}"
             if "W_px" in arrays:
@@ -192,8 +196,7 @@ def _numbers(name: str, arrays: Mapping[str, NDArray[Any]]) -> Array:
     array = arrays[name]
     if array.dtype.kind not in "fiu":
         raise TrackingError(f"{name} holds {array.dtype}, but numbers are needed")
-    rows = ROWS.get(name)
-    if rows and array.ndim == 2 and len(array) % rows == 0:
+    if (rows := ROWS.get(name)) and array.ndim == 2 and len(array) % rows == 0:
         array = array.reshape(-1, rows, array.shape[1])
     return array.astype(np.float64)
 

@@ -1,6 +1,5 @@
 """`modeshape modes`: the mode shapes of a recording's or of given tracks' rest shape as a figure."""
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -8,6 +7,7 @@ from typing import cast
 import numpy as np
 
 from app.figures.modes_figure import modes_figure, spectrum, title_of
+from app.files.track_file import holds_tracks, load_tracks
 from app.files.writing import check_outputs, writable
 from app.options.evaluate import Evaluate
 from app.options.modes import Modes
@@ -44,8 +44,7 @@ def modes(command: Modes, progress: Progress) -> Drawn:
     """
     check_outputs({"--out": command.out}, [command.source], overwrite=command.overwrite)
     with progress:
-        recorded = not (command.source.is_file() and zipfile.is_zipfile(command.source))  # an .npz is one
-        name, basis, mesh, metric = (of_recording if recorded else of_tracks)(command, progress)
+        name, basis, mesh, metric = (of_tracks if holds_tracks(command.source) else of_recording)(command, progress)
         eigenvalues = spectrum(basis, mesh, metric)
         png = modes_figure(basis, mesh, eigenvalues, title=title_of(name, basis, metric), columns=command.columns)
     with writable(command.out) as file:
@@ -75,9 +74,8 @@ def of_recording(command: Modes, progress: Progress) -> tuple[str, ModalBasis, M
 def of_tracks(command: Modes, progress: Progress) -> tuple[str, ModalBasis, Mesh, Metric]:
     """The same of tracks: their first frames are reconstructed until there is a rest shape."""
     from app.pipeline.evaluate import prepare
-    from tracking.tracks import Tracks
 
-    tracks = Tracks.load(command.source)
+    tracks = load_tracks(command.source)
     asked = Evaluate(command.source, rest_shape=command.rest_shape, camera=command.camera, model=command.model)
     reconstruction = prepare(asked, tracks, progress)
     for W, visible in zip(tracks.W, tracks.visible, strict=True):

@@ -25,7 +25,7 @@ class Evaluate(Json, Overwrite, FinalPass, FromTracks):
     )
 
     tracks: tyro.conf.Positional[Path]
-    """Tracks (.npz): W (F, 2, P), visible (F, P), and K, S_gt, gt_frames where known."""
+    """Tracks (.npz, .mat): W (F, 2, P), visible (F, P), and K, S_gt, gt_frames where known."""
     missing: float = 0.0
     """Share of the entries hidden at random."""
     noise: float = 0.0

@@ -36,7 +36,7 @@ class Modes(Json, Overwrite, FromTracks):
     )
 
     source: tyro.conf.Positional[Path]
-    """A recording (.rrd) or tracks (.npz)."""
+    """A recording (.rrd) or tracks (.npz, .mat)."""
     out: Path = Path("modes.png")
     """The figure, a PNG."""
     columns: int = 5

@@ -9,6 +9,7 @@ import numpy as np
 
 from app.arrays import Array, Flags
 from app.files.mesh_file import rest_of_vertices
+from app.files.track_file import load_tracks
 from app.files.writing import check_outputs
 from app.options.evaluate import Evaluate
 from app.pipeline.estimates import Collected, Scores, save_shapes, sigmas
@@ -84,7 +85,7 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
         UsageError, TrackingError, ReconstructionError: what stands in the way, and the remedy.
     """
     check_outputs({"--shapes-out": config.shapes_out}, (config.tracks, config.rest_shape), overwrite=config.overwrite)
-    tracks = Tracks.load(config.tracks)
+    tracks = load_tracks(config.tracks)
     frames, _, points = tracks.W.shape
     for most, of, what in ((MOST_POINTS, points, "points"), (MOST_VALUES, frames * points, "points in all frames")):
         if of > most:
