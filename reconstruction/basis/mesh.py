@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 # Triangles on the border bridge a dent of the outline, where nothing is seen, if they have
 SLIVER_DEGREES = 10.0  # a smaller angle, or
 LONG_SIDE = 4.0  # a side so many times as long as half of those at either end are at most, and half of all
+FAR_OFF = 3.0  # usual edges from what goes with the rest to what does not
 CHANCE = 3.0  # standard deviations of a count that come about by chance
 
 
@@ -124,18 +125,31 @@ def boundary(faces: Indices) -> Indices:
     return np.asarray(edges[count == 1], np.int64)
 
 
-def without_strays(mesh: Mesh, seen: Mask) -> Mesh:
-    """A mesh without vertices at its border that are seen (K, p) much more seldom than those around: they are beside it.
+def without_strays(mesh: Mesh, shape: Array, seen: Mask) -> Mesh:
+    """A mesh over a shape (3, p) without those vertices at its border that are beside it.
 
-    Where the surface's contour crosses another is a corner to whoever follows corners, but it goes with neither.
+    Where the surface's contour crosses another is a corner to whoever follows corners, but it goes with neither: it is seen
+    (K, p) much more seldom than those around. One or two alone are far off.
     """
     count = seen.sum(axis=0).astype(float)
     around = neighbour_averages(mesh, len(count)) @ count
     stray = np.zeros(len(count), np.bool_)
     stray[boundary(mesh.faces)] = True
-    stray &= around - count > CHANCE * np.sqrt(around)
+    stray &= (around - count > CHANCE * np.sqrt(around)) | on_islet(mesh, shape)
     faces = mesh.faces[~stray[mesh.faces].any(axis=1)]
     return mesh_from_faces(faces) if stray.any() and len(faces) else mesh
+
+
+def on_islet(mesh: Mesh, shape: Array) -> Mask:
+    """Which vertices (p,) of a shape (3, p), one or two, have all others further away than `FAR_OFF` usual edges."""
+    from scipy.sparse import csr_array  # takes its time to load, and who only draws needs none
+    from scipy.sparse.csgraph import connected_components
+
+    a, b = mesh.edges.T
+    length, p = np.linalg.norm(shape[:, a] - shape[:, b], axis=0), shape.shape[1]
+    near = length <= FAR_OFF * np.median(length)
+    island = connected_components(csr_array((near[near], (a[near], b[near])), shape=(p, p)), directed=False)[1]
+    return np.asarray(np.bincount(island)[island] < 3)
 
 
 def neighbour_averages(mesh: Mesh, vertices: int) -> "csr_array":

@@ -168,7 +168,7 @@ def build_model(
         modes: how many.
         metric: the dissimilarity they come from.
         mesh: its mesh, if it has one; else points are triangulated,
-        seen: and those that views (K, p) hardly ever show left out at the border: modes are those of all points.
+        seen: and those at the border that views (K, p) hardly ever show, or far off, left out: modes are those of all.
         own_motion: as for `modal_basis`.
 
     Raises:
@@ -178,7 +178,7 @@ def build_model(
 
     shape, whole = rest.motion.shape, mesh or triangulated(rest, camera, seen)
     basis = modal_basis(shape, whole, modes, metric, own_motion)
-    shown = whole if mesh or seen is None else without_strays(whole, seen)
+    shown = whole if mesh or seen is None else without_strays(whole, shape, seen)
     return Model(basis, shown, camera, float(rest.motion.s[0]))
 
 

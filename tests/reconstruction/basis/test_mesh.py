@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull, Delaunay
 
 from reconstruction import ReconstructionError
+from reconstruction.arrays import Array
 from reconstruction.basis.distances import manhattan
 from reconstruction.basis.mesh import (
     Mesh,
@@ -22,6 +23,11 @@ from reconstruction.basis.mesh import (
 from tests.reconstruction.world import SEEDS, spread
 
 SIZES = st.integers(4, 60)
+
+
+def lifted(points: Array) -> Array:
+    """Points (p, 2) of a plane as a shape (3, p)."""
+    return np.pad(points.T, ((0, 1), (0, 0)))
 
 
 @given(SEEDS, SIZES)
@@ -166,10 +172,11 @@ def test_vertices_at_the_border_that_are_hardly_ever_seen_are_left_out() -> None
     rng = np.random.default_rng(0)
     points = np.stack(np.meshgrid(np.arange(8.0), np.arange(6.0)), axis=-1).reshape(-1, 2)
     beside = np.array([[9.0, 2.4], [3.3, 2.6]])  # out on the right, and within
-    mesh = triangulate(np.concatenate([points, beside]))
+    points = np.concatenate([points, beside])
+    mesh = triangulate(points)
     seen = rng.random((30, 50)) < 0.95
     seen[:, 48:] = rng.random((30, 2)) < 0.1
-    left = without_strays(mesh, seen)
+    left = without_strays(mesh, lifted(points), seen)
     assert set(range(50)) - set(left.vertices.tolist()) == {48}
     assert set(map(tuple, left.faces.tolist())) < set(map(tuple, mesh.faces.tolist()))
 
@@ -177,9 +184,18 @@ def test_vertices_at_the_border_that_are_hardly_ever_seen_are_left_out() -> None
 @pytest.mark.parametrize("share", [0.3, 0.6, 1.0])
 def test_vertices_that_are_missing_by_chance_stay(share: float) -> None:
     rng = np.random.default_rng(0)
-    mesh = triangulate(rng.random((200, 2)))
-    left = without_strays(mesh, rng.random((30, 200)) < share)
+    points = rng.random((200, 2))
+    left = without_strays(triangulate(points), lifted(points), rng.random((30, 200)) < share)
     assert len(left.vertices) == 200
+
+
+@pytest.mark.parametrize(("off", "stays"), [(2.5, True), (8.0, False)])
+def test_two_vertices_far_away_from_all_are_left_out(off: float, *, stays: bool) -> None:
+    points = np.stack(np.meshgrid(np.arange(8.0), np.arange(6.0)), axis=-1).reshape(-1, 2)
+    points = np.concatenate([points, [[7 + off, 2.4], [8 + off, 2.1]]])
+    left = without_strays(triangulate(points), lifted(points), np.ones((30, 50), np.bool_))
+    assert [p in left.vertices for p in (48, 49)] == [stays, stays]
+    assert set(range(48)) <= set(left.vertices.tolist())
 
 
 def test_a_part_that_turns_away_stays() -> None:
@@ -187,7 +203,7 @@ def test_a_part_that_turns_away_stays() -> None:
     mesh = triangulate(points)
     seen = np.ones((30, 54), np.bool_)
     seen[8:, points[:, 0] > 4] = False
-    assert np.array_equal(without_strays(mesh, seen).faces, mesh.faces)
+    assert np.array_equal(without_strays(mesh, lifted(points), seen).faces, mesh.faces)
 
 
 def test_a_mesh_alone_has_its_vertices_only() -> None:
