@@ -32,7 +32,7 @@ ARROWS = {
     "app.picking": {"app.files", "app.terminal"},
     "app.demo": {"app.files", "app.terminal"},
     "app.synthetic": {"app.demo", "app.painting"},
-    "app.footage": set(),
+    "app.footage": {"app.files"},
     "app.rivals": set(),
     "app.bench": MEASURED,
     "app.reproduce": MEASURED | {"app.footage", "app.synthetic"},

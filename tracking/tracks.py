@@ -1,19 +1,14 @@
-"""Tracked points of a whole sequence, and the truth some sequences come with, as .npz files."""
+"""Tracked points of a whole sequence, and the truth some sequences come with."""
 
-import zipfile
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracking import Array, Flags, Indices, TrackingError
-from tracking.extent import LARGEST, check_extent
+from tracking.extent import LARGEST
 
-LARGEST_BYTES = 4 * 2**30  # of arrays in a file
-ROWS = {"W": 2, "W_px": 2, "S_gt": 3}  # of a frame, in matrices (2F, P) and (3K, P) as the literature has them
 SKEW = 1e-3  # of the focal length: more is no ordinary camera
 
 
@@ -59,40 +54,6 @@ class Tracks:
             if self.gt_frames[-1] >= frames:
                 raise TrackingError(f"gt_frames goes to {self.gt_frames[-1]}, but W has only the frames 0 to {frames - 1}")
 
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Read an .npz file, see `of`; a TrackingError says that it is missing, or no .npz."""
-        return cls.of(_read_npz(path), path)
-
-    @classmethod
-    def of(cls, arrays: Mapping[str, NDArray[Any]], path: Path) -> Self:
-        """Of a file's `W` and optionally `visible` (absent: what is finite), `K`, `S_gt`, `gt_frames` (absent: all).
-
-        W may be a matrix (2F, P), x and y of frame after frame, and S_gt likewise (3K, P). Pixels become square.
-
-        Raises:
-            TrackingError: there is no `W`, or the arrays do not fit.
-        """
-        if "W" not in arrays:
-            problem = f"{path} has no array W (frames, 2, points), only {_names(arrays)}"
-            if "W_px" in arrays:
-                raise TrackingError(f"{problem}; with W_px it is a file of truth only", "truth")
-            raise TrackingError(problem)
-        try:
-            W = _numbers("W", arrays)
-            visible = _flags("visible", arrays)
-            if visible is None:
-                visible = np.asarray(np.isfinite(W).all(axis=1) if W.ndim == 3 else np.zeros((0, 0), bool))
-            given = {name: _numbers(name, arrays) for name in ("K", "S_gt") if name in arrays}
-            gt_frames = _frame_numbers(arrays)
-            if gt_frames is None and len(given.get("S_gt", [])) == len(W):
-                gt_frames = np.arange(len(W))
-            tracks = cls(W, visible, given.get("K"), given.get("S_gt"), gt_frames)
-            check_extent(tracks.W, tracks.visible)
-            return tracks.with_square_pixels()
-        except TrackingError as error:
-            raise TrackingError(f"{path}: {error}") from None
-
     def with_square_pixels(self) -> Self:
         """The same with both focal lengths of K equal: y as long as x."""
         if self.K is None or self.K[0, 0] == self.K[1, 1]:
@@ -108,7 +69,7 @@ class Tracks:
         return replace(self, W=self.W[:, :, kept], visible=self.visible[:, kept], S_gt=S_gt)
 
     def save(self, file: BinaryIO) -> None:
-        """Write what `load` reads into a file that is open, as .npz."""
+        """Write it into a file that is open, as .npz."""
         optional = {"K": self.K, "S_gt": self.S_gt, "gt_frames": self.gt_frames}
         arrays: dict[str, Any] = {name: value for name, value in optional.items() if value is not None}
         np.savez_compressed(file, W=self.W, visible=self.visible, **arrays)
@@ -139,84 +100,6 @@ class Truth:
         if not np.isfinite(self.W_px).all():
             raise TrackingError("W_px has entries that are not finite")
         _check_intrinsics(self.K)
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Read an .npz file: `S_gt`, `gt_frames` and `W_px` (K, 2, P), or the `W` (F, 2, P) of a track file.
-
-        Raises:
-            TrackingError: the file is missing, is no .npz, lacks an array, or its arrays do not fit.
-        """
-        arrays = _read_npz(path)
-        needed = ("S_gt", "gt_frames") if "W" in arrays else ("S_gt", "gt_frames", "W_px")
-        missing = [name for name in needed if name not in arrays]
-        if missing:
-            raise TrackingError(f"{path} is no truth: no array {', '.join(missing)}, only {_names(arrays)}")
-        if "W_px" not in arrays:
-            tracks = Tracks.load(path)
-            assert tracks.S_gt is not None
-            assert tracks.gt_frames is not None
-            return cls(tracks.W[tracks.gt_frames], tracks.S_gt, tracks.gt_frames, tracks.K)
-        try:
-            frames = _frame_numbers(arrays)
-            assert frames is not None
-            K = _numbers("K", arrays) if "K" in arrays else None
-            return cls(_numbers("W_px", arrays), _numbers("S_gt", arrays), frames, K)
-        except TrackingError as error:
-            raise TrackingError(f"{path}: {error}") from None
-
-
-def _read_npz(path: Path) -> dict[str, NDArray[Any]]:
-    if not path.is_file():
-        raise TrackingError(f"no file {path}; check the path")
-    try:
-        if not zipfile.is_zipfile(path):
-            raise TrackingError(f"{path} is not an .npz file; write it with numpy.savez")
-        with zipfile.ZipFile(path) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-        if size > LARGEST_BYTES:
-            raise TrackingError(f"{path} unpacks to {size / 2**30:.0f} GB; at most {LARGEST_BYTES / 2**30:.0f} are read")
-        with np.load(path, allow_pickle=False) as file:
-            found = {name: file[name] for name in file.files}
-        strange = [name for name, value in found.items() if not isinstance(value, np.ndarray)]
-        if strange:
-            raise TrackingError(f"{path} holds {strange[0]}, which is no array: write it with numpy.savez")
-        return found
-    except TrackingError:
-        raise
-    except Exception as error:  # damaged archives raise a dozen different things, MemoryError among them
-        raise TrackingError(f"{path} is damaged or holds objects that are not arrays ({error})") from None
-
-
-def _names(arrays: Mapping[str, object]) -> str:
-    return ", ".join(sorted(arrays)) or "nothing"
-
-
-def _numbers(name: str, arrays: Mapping[str, NDArray[Any]]) -> Array:
-    array = arrays[name]
-    if array.dtype.kind not in "fiu":
-        raise TrackingError(f"{name} holds {array.dtype}, but numbers are needed")
-    if (rows := ROWS.get(name)) and array.ndim == 2 and len(array) % rows == 0:
-        array = array.reshape(-1, rows, array.shape[1])
-    return array.astype(np.float64)
-
-
-def _flags(name: str, arrays: Mapping[str, NDArray[Any]]) -> Flags | None:
-    if name not in arrays:
-        return None
-    array = arrays[name]
-    if array.dtype.kind not in "biu":
-        raise TrackingError(f"{name} holds {array.dtype}, but true or false is needed")
-    return array.astype(bool)
-
-
-def _frame_numbers(arrays: Mapping[str, NDArray[Any]]) -> Indices | None:
-    if "gt_frames" not in arrays:
-        return None
-    numbers = _numbers("gt_frames", arrays)
-    if not (np.isfinite(numbers).all() and np.all(numbers == np.round(numbers))):
-        raise TrackingError("gt_frames holds frame numbers that are not whole")
-    return numbers.astype(np.int64)
 
 
 def _check_intrinsics(K: Array | None) -> None:

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from app.files.track_file import load_tracks, load_truth
 from reconstruction.basis.mesh import locate, triangulate
-from tracking.tracks import Tracks, Truth
 
 
 def drift_px(tracks_file: Path, truth_file: Path) -> float:
@@ -15,7 +15,7 @@ def drift_px(tracks_file: Path, truth_file: Path) -> float:
         tracks_file: of `--tracks-out`, from the video's first frame on.
         truth_file: of `--ground-truth`.
     """
-    tracks, truth = Tracks.load(tracks_file), Truth.load(truth_file)
+    tracks, truth = load_tracks(tracks_file), load_truth(truth_file)
     known = truth.frames < len(tracks.W)
     frames, places = truth.frames[known], truth.W_px[known].transpose(0, 2, 1)
     W, visible = tracks.W[frames].transpose(0, 2, 1), tracks.visible[frames]

@@ -7,7 +7,8 @@ from typing import cast
 import numpy as np
 
 from app.figures.modes_figure import modes_figure, spectrum, title_of
-from app.files.track_file import holds_tracks, load_tracks
+from app.files.array_file import holds_arrays
+from app.files.track_file import load_tracks
 from app.files.writing import check_outputs, writable
 from app.options.evaluate import Evaluate
 from app.options.modes import Modes
@@ -44,7 +45,7 @@ def modes(command: Modes, progress: Progress) -> Drawn:
     """
     check_outputs({"--out": command.out}, [command.source], overwrite=command.overwrite)
     with progress:
-        name, basis, mesh, metric = (of_tracks if holds_tracks(command.source) else of_recording)(command, progress)
+        name, basis, mesh, metric = (of_tracks if holds_arrays(command.source) else of_recording)(command, progress)
         eigenvalues = spectrum(basis, mesh, metric)
         png = modes_figure(basis, mesh, eigenvalues, title=title_of(name, basis, metric), columns=command.columns)
     with writable(command.out) as file:

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from app.arrays import Array, Image
+from app.files.track_file import load_truth
 from tracking.tracks import Truth
 from tracking.video import Video
 
@@ -27,7 +28,7 @@ class Clip:
     @cached_property
     def known(self) -> Truth:
         """The true shapes."""
-        return Truth.load(self.truth)
+        return load_truth(self.truth)
 
     @cached_property
     def size(self) -> tuple[int, int]:

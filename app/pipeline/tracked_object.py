@@ -8,6 +8,7 @@ import numpy as np
 
 from app.arrays import Array, Flags, Image
 from app.files.stored_tracks import StoredFrame, StoredTracks
+from app.files.track_file import load_truth
 from app.files.writing import writable
 from app.options.run import Run, configuration
 from app.pipeline.estimates import Collected, Scores, save_shapes
@@ -21,7 +22,6 @@ from reconstruction.mapping.start import Start
 from reconstruction.online import Phase
 from tracking.guarded import Change, Guarded
 from tracking.observation import Observation
-from tracking.tracks import Truth
 from tracking.video import Frame
 
 
@@ -60,7 +60,7 @@ class TrackedObject:
         frames: int | None = None,
     ) -> None:
         self.config, self.number, self.first, self.points_px, self._watch = config, number, first, points_px, watch
-        self._truth = Truth.load(config.ground_truth) if config.ground_truth else None
+        self._truth = load_truth(config.ground_truth) if config.ground_truth else None
         self.collected = self._nothing()
         self.online: Collected | None = None
         self._texture: Image | None = None

@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from app.files.track_file import load_truth
 from app.options.run import Output, Run
 from app.pipeline.session import Session
 from app.terminal.progress import Progress
 from reconstruction.basis.mesh import mesh_from_faces
 from reconstruction.evaluation import e3d, followed
 from tests.tracking.scene import texture
-from tracking.tracks import Truth
 from tracking.video import Video
 
 Image = NDArray[np.uint8]
@@ -69,7 +69,7 @@ def run(video: Path, truth: Path, roi: tuple[int, int, int, int] | None, folder:
 
 def errors_by_frame(shapes: Path, truth: Path) -> tuple[NDArray[np.int64], Array]:
     """The truth frames (K,) that have a shape, and the e3d (K,) of each, one scale and depth sign for all."""
-    known = Truth.load(truth)
+    known = load_truth(truth)
     with np.load(shapes) as file:
         row = {int(f): k for k, f in enumerate(file["frames"]) if np.isfinite(file["s"][k])}
         chosen = np.array([k for k, f in enumerate(known.frames) if int(f) in row])
@@ -146,7 +146,7 @@ def occluded(truth: Path, where: str = "disc") -> Change:
 
     It lies in the middle (disc), across the middle (band) or over one side (side).
     """
-    known = Truth.load(truth)
+    known = load_truth(truth)
     cover = texture(9, (1000, 900))
     measure = {
         "disc": lambda x, y, centre: np.hypot(x - centre[0], y - centre[1]),
@@ -175,7 +175,7 @@ def occluded(truth: Path, where: str = "disc") -> Change:
 
 def thinned(video: Path, truth: Path, folder: Path, share: float) -> tuple[Path, Path]:
     """A video that lost a share of its first frames at random, and the truth of those that are left."""
-    known = Truth.load(truth)
+    known = load_truth(truth)
     rng = np.random.default_rng(0)
     with Video(str(video)) as frames:
         kept = [frame for frame in itertools.islice(frames, FRAMES) if frame.index == 0 or rng.random() >= share]

@@ -4,12 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
+from app.files.track_file import load_truth
 from tests.tracking.scene import SIZE, moved, texture, tilt
 from tracking.features import detect_corners
 from tracking.klt import PointTracker
 from tracking.observation import Observation
 from tracking.region.mask import region_mask
-from tracking.tracks import Truth
 from tracking.video import Video
 
 STEPS = np.linspace(0.0, 1.0, 16)[1:]
@@ -203,7 +203,7 @@ def test_the_paper_is_followed_without_a_model(shared_data: Path) -> None:
     """Against the true pixels: each point is held by barycentric coordinates in the first true frame."""
     from scipy.spatial import Delaunay
 
-    truth = Truth.load(shared_data / "kinect_paper_gt.npz")
+    truth = load_truth(shared_data / "kinect_paper_gt.npz")
     with Video(str(shared_data / "kinect_paper.mp4"), 0, 113) as video:
         frames = iter(video)
         first = next(frames).image

@@ -3,6 +3,7 @@
 import numpy as np
 
 from app.figures.modes_figure import modes_figure, spectrum, title_of
+from app.files.track_file import load_tracks
 from app.reproduce.chart import Panel, Series, charts
 from app.reproduce.experiment import Experiment
 from app.reproduce.experiments.basis_time import METRICS
@@ -13,7 +14,6 @@ from app.reproduce.work import Effort, Work
 from reconstruction.basis.mesh import Mesh, triangulate
 from reconstruction.basis.modes import modal_basis
 from reconstruction.settings import Metric
-from tracking.tracks import Tracks
 
 DRAWN = 5
 SHARES = (5, 10, 20, 30)  # numbers of modes whose share of all eigenvalues is told
@@ -24,7 +24,7 @@ def mode_shapes(work: Work) -> Result:
     """The modes of a synthetic dome and of the flag, and the flag's spectrum with every distance."""
     dome = organ(DOME_POINTS).rest
     surfaces = [("a dome", dome, triangulate(dome[:2].T), "modes-dome.jpg")]
-    truth = Tracks.load(work.data / FLAG.file).S_gt
+    truth = load_tracks(work.data / FLAG.file).S_gt
     assert truth is not None
     flag, flag_mesh = truth[0], triangulate(truth[0, :2].T)
     surfaces.append(("flag250", flag, flag_mesh, "modes-flag250.jpg"))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rerun.chunk import RrdReader
 
 from app.commands.modes import modes
+from app.files.track_file import load_tracks
 from app.options.model import Model
 from app.options.modes import Modes
 from app.options.run import Output
@@ -70,7 +71,7 @@ def test_a_recording_shows_its_own_modes(tmp_path: Path, run: Run) -> None:
 
 
 def test_tracks_show_the_modes_of_their_rest_shape(tmp_path: Path, tracks: Path) -> None:
-    truth = Tracks.load(tracks).S_gt
+    truth = load_tracks(tracks).S_gt
     assert truth is not None
     found = {}
     for kind in ("first-truth", "rigid"):

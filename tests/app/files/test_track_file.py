@@ -1,75 +1,197 @@
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.io import savemat
 
-from app.files.track_file import holds_tracks, load_tracks
+from app.files.track_file import load_tracks, load_truth
 from tracking import TrackingError
+from tracking.tracks import Tracks
 
 F, P = 5, 7
 RNG = np.random.default_rng(0)
-W, S = RNG.uniform(0, 100, (F, 2, P)), RNG.normal(size=(F, 3, P))
-SEEN = RNG.random((F, P)) < 0.7
+W = RNG.uniform(0, 100, (F, 2, P))
+S = RNG.normal(size=(2, 3, P))
+K = np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]])
+COMPLETE: dict[str, Any] = {"W": W, "visible": np.ones((F, P), bool), "K": K, "S_gt": S, "gt_frames": np.array([1, 4])}
+TRUTH: dict[str, Any] = {"W_px": W[:2], "S_gt": S, "gt_frames": np.array([1, 4]), "K": K}
+NAN_W = np.where(np.arange(P) == 3, np.nan, W)
 
 
-def cells(frames: Any) -> Any:
-    """A MATLAB cell array (1, F) of matrices."""
-    made = np.empty((1, len(frames)), object)
-    made[0] = [*frames]
-    return made
+def write(folder: Path, **arrays: Any) -> Path:
+    path = folder / "tracks.npz"
+    np.savez(path, **{name: value for name, value in arrays.items() if value is not None})
+    return path
+
+
+def test_saved_tracks_come_back(tmp_path: Path) -> None:
+    visible = RNG.random((F, P)) < 0.7
+    tracks = Tracks(np.where(visible[:, None], W, np.nan), visible, K, S, np.array([1, 4]))
+    path = tmp_path / "any name"
+    with path.open("wb") as file:
+        tracks.save(file)
+    loaded = load_tracks(path)
+    for name in ("W", "visible", "K", "S_gt", "gt_frames"):
+        np.testing.assert_array_equal(getattr(loaded, name), getattr(tracks, name))
+
+
+def test_only_w_is_needed(tmp_path: Path) -> None:
+    tracks = load_tracks(write(tmp_path, W=W.astype(np.float32)))
+    assert tracks.W.dtype == np.float64
+    assert tracks.visible.all()
+    assert tracks.visible.shape == (F, P)
+    assert tracks.K is tracks.S_gt is tracks.gt_frames is None
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_hidden_entries_may_be_nan(tmp_path: Path, *, told: bool) -> None:
+    visible = {"visible": np.isfinite(NAN_W[:, 0]).astype(np.uint8)} if told else {}
+    assert load_tracks(write(tmp_path, W=NAN_W, **visible)).visible.sum() == F * (P - 1)
+
+
+def test_matrices_have_the_rows_of_frame_after_frame(tmp_path: Path) -> None:
+    path = write(tmp_path, **COMPLETE | {"W": W.reshape(2 * F, P), "S_gt": S.reshape(-1, P)})
+    tracks = load_tracks(path)
+    np.testing.assert_array_equal(tracks.W, W)
+    assert tracks.S_gt is not None
+    np.testing.assert_array_equal(tracks.S_gt, S)
+
+
+@pytest.mark.parametrize("axes", [(0, 2, 1), (1, 2, 0)])
+def test_coordinates_may_come_last_or_first(tmp_path: Path, axes: tuple[int, int, int]) -> None:
+    tracks = load_tracks(write(tmp_path, W=W.transpose(axes), S_gt=S.transpose(axes), gt_frames=COMPLETE["gt_frames"]))
+    np.testing.assert_array_equal(tracks.W, W)
+    np.testing.assert_array_equal(tracks.S_gt, S)
+
+
+def test_true_shapes_of_all_frames_need_no_numbers(tmp_path: Path) -> None:
+    tracks = load_tracks(write(tmp_path, W=W, S_gt=np.repeat(S[:1], F, axis=0)))
+    assert tracks.gt_frames is not None
+    assert tracks.gt_frames.tolist() == list(range(F))
 
 
 @pytest.mark.parametrize(
-    "arrays",
+    ("change", "says"),
     [
-        {"W": W, "S_gt": S},
-        {"W": W.reshape(2 * F, P), "S": S.reshape(3 * F, P), "Rs": np.zeros((2 * F, 3))},
-        {"W": np.moveaxis(W, 0, 2), "P3_gt": np.moveaxis(S, 0, 2), "name": "shark"},
-        {"W": cells(W), "GT": cells(S), "scene": {"of": "something"}},
+        ({"W": None}, "has no array W (frames, 2, points), only K, S_gt, gt_frames, visible"),
+        ({"W": None, "W_px": W[:2]}, "with W_px it is a file of truth only"),
+        ({"W": W[0, :1]}, "W has the shape (1, 7), but (frames, 2, points) is needed"),
+        ({"W": W.reshape(F, P, 2, 1)}, "W has the shape (5, 7, 2, 1), but (frames, 2, points) is needed"),
+        ({"W": RNG.random((F, 3, P))}, "W has the shape (5, 3, 7), but (frames, 2, points) is needed"),
+        ({"W": W[:0]}, "W has the shape (0, 2, 7), but"),
+        ({"W": NAN_W}, "W has 5 visible entries that are not finite (first: frame 0, point 3)"),
+        ({"W": W.astype(str)}, "W holds <U32, but numbers are needed"),
+        ({"W": W * 1j}, "W holds complex128, but numbers are needed"),
+        ({"visible": np.ones((P, F), bool)}, "visible has the shape (7, 5), but (5, 7) as in W is needed"),
+        ({"visible": np.full((F, P), 0.5)}, "visible holds float64, but true or false is needed"),
+        ({"K": np.eye(4)}, "K has the shape (4, 4), but (3, 3) is needed"),
+        ({"K": -K}, "its focal lengths K[0, 0] and K[1, 1] must be positive"),
+        ({"K": K * np.nan}, "K is no camera matrix"),
+        ({"S_gt": None}, "S_gt and gt_frames belong together"),
+        ({"gt_frames": None}, "S_gt and gt_frames belong together"),
+        ({"S_gt": S[:, :, :4]}, "S_gt has the shape (2, 3, 4), but (true frames, 3, 7) as there are 7 points"),
+        ({"S_gt": S[:, :2]}, "S_gt has the shape (2, 2, 7), but"),
+        ({"S_gt": S * np.inf}, "S_gt has entries that are not finite"),
+        ({"gt_frames": np.arange(3)}, "gt_frames has the shape (3,), but (2,) as S_gt has 2 shapes is needed"),
+        ({"gt_frames": np.array([1, 5])}, "gt_frames goes to 5, but W has only the frames 0 to 4"),
+        ({"gt_frames": np.array([-1, 4])}, "gt_frames must ascend from 0"),
+        ({"gt_frames": np.array([4, 1])}, "gt_frames must ascend from 0"),
+        ({"gt_frames": np.array([1.5, 3])}, "gt_frames holds frame numbers that are not whole"),
     ],
-    ids=["as in NumPy", "matrices", "frames last", "cells"],
 )
-def test_tracks_of_matlab(tmp_path: Path, arrays: dict[str, Any]) -> None:
-    path = tmp_path / "tracks.mat"
-    savemat(path, {**arrays, "visible": SEEN.astype(float), "K": np.diag([500.0, 500, 1])})
-    read = load_tracks(path)
-    assert holds_tracks(path)
-    np.testing.assert_array_equal(read.W, W)
-    np.testing.assert_array_equal(read.S_gt, S)
-    np.testing.assert_array_equal(read.visible, SEEN)
-    np.testing.assert_array_equal(read.gt_frames, np.arange(F))
+def test_tracks_that_do_not_fit(tmp_path: Path, change: dict[str, Any], says: str) -> None:
+    path = write(tmp_path, **{**COMPLETE, **change})
+    with pytest.raises(TrackingError, match=re.escape(says)) as error:
+        load_tracks(path)
+    assert str(error.value).startswith(str(path))
+    assert "\n" not in str(error.value)
 
 
-def test_true_frames_are_a_list(tmp_path: Path) -> None:
-    path = tmp_path / "tracks.MAT"
-    savemat(path, {"W": W, "S_gt": S[:2], "S": S, "gt_frames": [0.0, 3.0]})
-    read = load_tracks(path)
-    np.testing.assert_array_equal(read.gt_frames, [0, 3])
-    np.testing.assert_array_equal(read.S_gt, S[:2])
-
-
+@pytest.mark.parametrize("load", [load_tracks, load_truth])
 @pytest.mark.parametrize(
     ("content", "says"),
     [
-        (b"", "is no .mat file, or damaged"),
-        (b"W = 1, 2, 3", "is no .mat file, or damaged"),
-        (b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + bytes(512), "format 7.3, which is not read: save(..., '-v7')"),
+        (None, "no file {}; check the path"),
+        (b"", "{} is not an .npz file"),
+        (b"W = 1, 2, 3", "{} is not an .npz file"),
     ],
 )
-def test_files_that_are_no_mat(tmp_path: Path, content: bytes, says: str) -> None:
-    path = tmp_path / "tracks.mat"
-    path.write_bytes(content)
+def test_files_that_are_no_npz(tmp_path: Path, load: Callable[[Path], object], content: bytes | None, says: str) -> None:
+    path = tmp_path / "tracks.npz"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(TrackingError, match=re.escape(says.format(path))):
+        load(path)
+
+
+def test_damaged_files_are_never_a_traceback(tmp_path: Path) -> None:
+    path = write(tmp_path, **COMPLETE)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(0)
+    refused = 0
+    for _ in range(200):
+        broken = bytearray(whole)
+        for i in rng.integers(0, len(whole), 4):
+            broken[i] ^= 1 << int(rng.integers(8))
+        path.write_bytes(bytes(broken[: rng.integers(len(whole) // 2, len(whole) + 1)]))
+        try:
+            load_tracks(path)
+        except TrackingError:
+            refused += 1
+    assert refused > 100
+
+
+def test_an_npz_of_objects_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.npz"
+    np.savez(path, W=np.array([{"a": 1}], object))
+    with pytest.raises(TrackingError, match="holds objects that are not arrays"):
+        load_tracks(path)
+
+
+def test_truth_comes_with_pixels_or_in_a_track_file(tmp_path: Path) -> None:
+    for arrays in (TRUTH, {**COMPLETE, "W": np.insert(W[:2], [1, 1, 1], W[2:], axis=0)[[2, 0, 2, 3, 4]]}):
+        truth = load_truth(write(tmp_path, **arrays))
+        np.testing.assert_array_equal(truth.S, S)
+        np.testing.assert_array_equal(truth.frames, [1, 4])
+        np.testing.assert_array_equal(truth.W_px, arrays["W_px"] if "W_px" in arrays else arrays["W"][[1, 4]])
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"W_px": None}, "is no truth: no array W_px, only K, S_gt, gt_frames"),
+        ({"S_gt": None, "gt_frames": None}, "is no truth: no array S_gt, gt_frames, only K, W_px"),
+        ({"W_px": W}, "W_px has the shape (5, 2, 7), but (2, 2, 7) as in S_gt is needed"),
+        ({"W_px": W[:, :1]}, "W_px has the shape (5, 1, 7), but (true frames, 2, points) is needed"),
+        ({"W_px": W[:2] * np.nan}, "W_px has entries that are not finite"),
+        ({"S_gt": S[..., :3]}, "S_gt has the shape (2, 3, 3), but"),
+        ({"gt_frames": np.array([1, 1])}, "gt_frames must ascend"),
+        ({"K": np.eye(2)}, "K has the shape (2, 2), but (3, 3) is needed"),
+    ],
+)
+def test_truth_that_does_not_fit(tmp_path: Path, change: dict[str, Any], says: str) -> None:
     with pytest.raises(TrackingError, match=re.escape(says)):
-        load_tracks(path)
+        load_truth(write(tmp_path, **{**TRUTH, **change}))
 
 
-def test_what_is_missing_is_named(tmp_path: Path) -> None:
-    path = tmp_path / "tracks.mat"
-    savemat(path, {"P3_gt": S})
-    with pytest.raises(TrackingError, match=re.escape("has no array W (frames, 2, points), only S_gt")):
-        load_tracks(path)
-    with pytest.raises(TrackingError, match="no file"):
-        load_tracks(tmp_path / "none.mat")
+def test_shared_files_load(shared_data: Path) -> None:
+    truth = load_truth(shared_data / "kinect_paper_gt.npz")
+    assert truth.W_px.shape == (23, 2, 301)
+    assert truth.K is not None
+    with pytest.raises(TrackingError, match="truth only"):
+        load_tracks(shared_data / "kinect_paper_gt.npz")
+    for name, shape in (("flag250", (30, 2, 250)), ("flag250_perspective", (30, 2, 250)), ("face37", (74, 2, 37))):
+        assert load_tracks(shared_data / f"{name}.npz").W.shape == shape
+        assert load_truth(shared_data / f"{name}.npz").W_px.shape[2] == shape[2]
+
+
+def test_pixels_that_are_not_square_become_square(tmp_path: Path) -> None:
+    high = K * [[1.0], [1.5], [1.0]]
+    stretched = W.copy()
+    stretched[:, 1] = high[1, 2] + 1.5 * (W[:, 1] - K[1, 2])
+    tracks = load_tracks(write(tmp_path, W=stretched, K=high))
+    assert tracks.K is not None
+    np.testing.assert_allclose(tracks.W[:, 1] - tracks.K[1, 2], W[:, 1] - K[1, 2], atol=1e-9)
+    assert tracks.K[0, 0] == tracks.K[1, 1] == K[0, 0]

@@ -6,11 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
+from app.files.track_file import load_truth
 from app.footage.case import write
 from app.footage.catalog import CASES
 from app.footage.clip import Clip
 from app.footage.storage import Storage
-from tracking.tracks import Truth
 from tracking.video import Video
 
 FRAMES, EVERY, SIZE = 100, 4, (320, 240)
@@ -45,7 +45,7 @@ def dots(tmp_path_factory: pytest.TempPathFactory) -> Clip:
 @pytest.mark.parametrize("name", GEOMETRY)
 def test_the_truth_is_where_the_picture_shows_it(dots: Clip, tmp_path: Path, name: str) -> None:
     copy = write(dots, CASES[name], tmp_path)
-    truth = Truth.load(copy.truth)
+    truth = load_truth(copy.truth)
     assert truth.K is not None
     image = truth.K @ truth.S
     assert np.allclose(image[:, :2] / image[:, 2:], truth.W_px)

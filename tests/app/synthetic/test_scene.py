@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from app.demo.camera import K, project
+from app.files.track_file import load_tracks, load_truth
 from app.synthetic.catalog import HELD_SEEDS, KINDS
 from app.synthetic.places import grid
 from app.synthetic.scene import scene
 from app.synthetic.tracks import SEVERE, USUAL, tracks
 from app.synthetic.video import Renderer, region, write_video
-from tracking.tracks import Tracks, Truth
 from tracking.video import Video
 
 
@@ -45,7 +45,7 @@ def test_tracks_are_the_truth_seen_by_the_camera(tmp_path: Path) -> None:
     made = tracks(scene("head", 1, frames=40))
     with (tmp_path / "head.npz").open("wb") as file:
         made.save(file)
-    read = Tracks.load(tmp_path / "head.npz")
+    read = load_tracks(tmp_path / "head.npz")
     assert read.S_gt is not None
     image = K @ read.S_gt
     off = (read.W - image[:, :2] / image[:, 2:]).transpose(0, 2, 1)[read.visible]
@@ -82,7 +82,7 @@ def test_a_video_comes_with_its_truth(tmp_path: Path) -> None:
     filmed = write_video(one, tmp_path)
     with Video(str(filmed.video)) as video:
         assert sum(1 for _ in video) == 9
-    truth = Truth.load(filmed.truth)
+    truth = load_truth(filmed.truth)
     assert truth.frames.tolist() == [0, 4, 8]
     x, y, w, h = filmed.roi
     assert filmed.roi == region(one)

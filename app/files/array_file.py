@@ -1,0 +1,74 @@
+"""Arrays in a file by name: NumPy's .npz, or MATLAB's .mat."""
+
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracking import TrackingError
+
+LARGEST_BYTES = 4 * 2**30  # of arrays in a file
+
+Arrays = Mapping[str, NDArray[Any]]
+
+
+def holds_arrays(path: Path) -> bool:
+    """Whether there is such a file."""
+    return path.is_file() and (_is_mat(path) or zipfile.is_zipfile(path))
+
+
+def read_arrays(path: Path) -> Arrays:
+    """All arrays of a file.
+
+    Raises:
+        TrackingError: it is missing, damaged, too large, or holds what is no array.
+    """
+    if not path.is_file():
+        raise TrackingError(f"no file {path}; check the path")
+    return _read_mat(path) if _is_mat(path) else _read_npz(path)
+
+
+def _is_mat(path: Path) -> bool:
+    return path.suffix.lower() == ".mat"
+
+
+def _read_npz(path: Path) -> Arrays:
+    try:
+        if not zipfile.is_zipfile(path):
+            raise TrackingError(f"{path} is not an .npz file; write it with numpy.savez")
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > LARGEST_BYTES:
+            raise TrackingError(f"{path} unpacks to {size / 2**30:.0f} GB; at most {LARGEST_BYTES / 2**30:.0f} are read")
+        with np.load(path, allow_pickle=False) as file:
+            found = {name: file[name] for name in file.files}
+        strange = [name for name, value in found.items() if not isinstance(value, np.ndarray)]
+        if strange:
+            raise TrackingError(f"{path} holds {strange[0]}, which is no array: write it with numpy.savez")
+        return found
+    except TrackingError:
+        raise
+    except Exception as error:  # damaged archives raise a dozen different things, MemoryError among them
+        raise TrackingError(f"{path} is damaged or holds objects that are not arrays ({error})") from None
+
+
+def _read_mat(path: Path) -> Arrays:
+    from scipy.io import loadmat  # takes its time to load, and few ask
+
+    try:
+        found: Mapping[str, Any] = loadmat(path)
+    except NotImplementedError:
+        raise TrackingError(f"{path} has MATLAB's format 7.3, which is not read: save(..., '-v7')") from None
+    except Exception as error:  # damaged files raise a dozen different things
+        raise TrackingError(f"{path} is no .mat file, or damaged ({error})") from None
+    return {name: _of_cells(value) for name, value in found.items() if isinstance(value, np.ndarray)}
+
+
+def _of_cells(value: NDArray[Any]) -> NDArray[Any]:
+    """The matrices in a MATLAB cell array, if they are alike, as one array."""
+    if value.dtype != object or len({np.shape(cell) for cell in value.flat}) != 1:
+        return value
+    return np.stack(list(value.flat))
