@@ -13,7 +13,7 @@ from reconstruction.basis.mesh import Mesh, ratio_of_sizes
 from reconstruction.basis.model import Model, build_model
 from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, medoid
 from reconstruction.camera import Camera, lens, nearest_rotation
-from reconstruction.mapping.isometric.adjustment import BUNDLE_ROUNDS, FEW_ROUNDS, bundled, in_halves, refined, sheet
+from reconstruction.mapping.isometric.adjustment import FEW_ROUNDS, MOST_ROUNDS, bundled, in_halves, refined, sheet
 from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.one_frame import Foreseen, shape_in
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
@@ -225,7 +225,7 @@ def sheet_map(
     if camera.perspective:
         found = under_its_focal_length(found) if estimate_focal else found
         camera = found.camera
-    found = bundled(found, W, BUNDLE_ROUNDS if last else FEW_ROUNDS)
+    found = bundled(found, W, MOST_ROUNDS if last else FEW_ROUNDS)
     if last and camera.perspective and found.stretch > USUAL_STRETCH:
         found = bundled(refined(found, W, visible), W)
     shapes = found.shapes()
@@ -243,7 +243,7 @@ def sheet_map(
     s = found.camera.focal_px / (unit_px * origin[:, 2])
     t = (s * unit_px)[:, None] * origin[:, :2] + found.camera.center_px - camera.center_px
     motion = RigidMotion(unit_px * rest, np.stack(poses), s, t)
-    note = f"sheet from {len(shapes)} keyframes, lengths change by {found.strain_rms:.1%}; {evidence.note}"
+    note = f"{found.note}; {evidence.note}"
     # Its shapes hold no noise that more modes would fit; fewer than its functions cut off bends, but are faster on the way.
     note = note if given is None else f"{given.note}; {note}"
     shape = RestShape("isometric" if given is None else given.kind, motion, note)

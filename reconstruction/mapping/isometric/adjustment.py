@@ -5,6 +5,7 @@ all keyframes. It needs a perspective camera; `focal` looks for its focal length
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -14,19 +15,26 @@ from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FINE_FUNCTIONS as FINE_SHAPES
 from reconstruction.mapping.isometric.bundle import GIVE, MOST_GIVE, places_moved
+from reconstruction.mapping.isometric.flat_parts import folded
+from reconstruction.mapping.isometric.images.creases import creases_in
+from reconstruction.mapping.isometric.images.smooth_field import smooth_field
+from reconstruction.mapping.isometric.images.warps import Warps, creased, finer, smooth_warps
 from reconstruction.mapping.isometric.lengths import adjust_depths, finish_depths
 from reconstruction.mapping.isometric.nodes import edges_between, nodes_of, on_edges, rays_of
 from reconstruction.mapping.isometric.sheet import IsometricSheet, described
-from reconstruction.mapping.isometric.smooth_field import smooth_field
-from reconstruction.mapping.isometric.starts import SOLVER, again, first_depths, once_more
-from reconstruction.mapping.isometric.warps import Warps, finer, smooth_warps
+from reconstruction.mapping.isometric.starts import FROM_PLANES, SOLVER, again, coefficients_of, first_depths, once_more
 
 FUNCTIONS, FINE_FUNCTIONS = 40, 60
-BUNDLE_ROUNDS = 12  # of shapes with lengths, then places
+MOST_ROUNDS, USUAL_ROUNDS = (
+    60,
+    12,
+)  # of shapes with lengths, then places; more than usual only where
+FALLING = 0.99  # ... lengths change by less than so many times what they changed by a round before
 FEW_ROUNDS = 2  # bring most of that in a tenth of a second
 SETTLED = 2e-4  # of the shapes' size: a round that moves them less is the last
 ROUNDS = 6  # at most, of starting frames again that do not fit
 LITTLE_GAIN = 0.1  # of the change: a round that brought less is the last
+KEPT, LESS = 0.004, 0.7  # change of lengths, noise apart, at which creases are believed, and times that of fewer
 MOST_CHANGE = 0.06  # of lengths, rms, noise apart: no cloth seems to, with folds cut off; less is weighed against a solid
 MOST_AT_ALL = 0.08  # with noise: what is that far off smooth images is not noise
 MOST_PARALLAX = 0.01  # over the image's RMS radius: true sheets up to 0.5 %, by noise; what is seen through 1.5 % and more
@@ -53,24 +61,42 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
         raise ReconstructionError("a sheet of unknown shape needs 3 keyframes and 20 points")
     if (parallax := warps.parallax_over_size(W, visible)) > MOST_PARALLAX:
         raise ReconstructionError(f"no smooth surface: points are {parallax:.1%} of its size off it, together")
-    return on_smooth_images(warps, camera)
+    found = on_smooth_images(warps, camera)
+    if found.strain_beyond_noise > KEPT:
+        creases = creases_in(warps, W)
+        for k in range(1, len(creases) + 1):
+            found = folding(creased(warps, W, visible, creases[:k]), camera, found)
+    return found
+
+
+def folding(warps: Warps, camera: Camera, otherwise: IsometricSheet) -> IsometricSheet:
+    """The sheet with creases, if it keeps its lengths, and much better than a sheet with fewer."""
+    with suppress(ReconstructionError):
+        found = on_smooth_images(warps, camera)
+        if found.strain_beyond_noise < KEPT and found.change < LESS * otherwise.change:
+            return found
+    return otherwise
 
 
 def on_smooth_images(warps: Warps, camera: Camera) -> IsometricSheet:
-    """The sheet that is seen in smooth images.
+    """The sheet that is seen in images that are smooth but for its creases.
 
     Raises:
         ReconstructionError: no depths keep the lengths.
     """
     nodes = nodes_of(warps)
-    field = smooth_field(nodes.reference, FUNCTIONS)
+    field = smooth_field(nodes.reference, FUNCTIONS, warps.field.creases)
     values = warps.values_of(field)
+    B = values[nodes.points]
     seen = edges_between(nodes, on_edges(nodes, field), camera)
-    c = first_depths(nodes, seen, values[nodes.points], field.stiffness, camera)
+    if len(field.creases):
+        c, solver = coefficients_of(folded(warps, camera)[:, nodes.points], B, field.stiffness), FROM_PLANES
+    else:
+        c, solver = first_depths(nodes, seen, B, field.stiffness, camera), SOLVER
     factor, change = np.ones(len(nodes.ends)), np.inf
     for _ in range(ROUNDS):
-        c, factor = again(nodes, seen, seen.weighted(factor), c, values[nodes.points], field.stiffness, camera)
-        before, found = change, described(warps, nodes, field, values, c, factor, camera, SOLVER.bend)
+        c, factor = again(nodes, seen, seen.weighted(factor), c, B, field.stiffness, camera, solver)
+        before, found = change, described(warps, nodes, field, values, c, factor, camera, solver)
         change = found.strain_rms
         if change > (1 - LITTLE_GAIN) * before:
             break
@@ -83,10 +109,10 @@ def by_part(found: IsometricSheet, part: Indices) -> IsometricSheet:
     """The sheet by some of its frames alone: depths and lengths adjusted anew from those there are."""
     nodes = found.nodes.in_frames(part)
     edges = found.edges_in(nodes)
-    c = adjust_depths(edges, found.coefficients[part], found.field.stiffness, SOLVER)
+    c = adjust_depths(edges, found.coefficients[part], found.field.stiffness, found.solver)
     warps = found.warps.in_frames(part)
     functions, factor = found.shape_functions, found.edge_weights
-    return described(warps, nodes, found.field, found.values, c, factor, found.camera, found.bend, functions)
+    return described(warps, nodes, found.field, found.values, c, factor, found.camera, found.solver, functions)
 
 
 def in_halves(found: IsometricSheet, W: Array, halves: Sequence[Indices]) -> tuple[list[tuple[Array, Array, Array]], float]:
@@ -94,7 +120,7 @@ def in_halves(found: IsometricSheet, W: Array, halves: Sequence[Indices]) -> tup
     made = [by_part(found, half) for half in halves]
     shapes = []
     for one, other, half in zip(made, reversed(made), halves, strict=True):
-        told = finish_depths(one.edges, other.log_lengths, one.coefficients, one.field.stiffness, one.bend)[0]
+        told = finish_depths(one.edges, other.log_lengths, one.coefficients, one.field.stiffness, one.solver.bend)[0]
         shapes.append((*one.both(W[half]), one.along_rays(told, W[half])))
     return shapes, found.strain_beyond_noise
 
@@ -109,13 +135,13 @@ def refined(found: IsometricSheet, W: Array, visible: Mask) -> IsometricSheet:
     """
     warps = finer(found.warps, W, visible)
     nodes = nodes_of(warps, fine=True)
-    field = smooth_field(nodes.reference, FINE_FUNCTIONS)
+    field = smooth_field(nodes.reference, FINE_FUNCTIONS, warps.field.creases)
     values = warps.values_of(field)
     B, seen = values[nodes.points], edges_between(nodes, on_edges(nodes, field), found.camera)
     c = found.coefficients @ found.values[nodes.points].T @ np.linalg.pinv(B).T
-    c, factor = once_more(seen, seen, c, field.stiffness)
-    c, factor = again(nodes, seen, seen.weighted(factor), c, B, field.stiffness, found.camera)
-    finer_one = described(warps, nodes, field, values, c, factor, found.camera, found.bend, FINE_SHAPES)
+    c, factor = once_more(seen, seen, c, field.stiffness, found.solver)
+    c, factor = again(nodes, seen, seen.weighted(factor), c, B, field.stiffness, found.camera, found.solver)
+    finer_one = described(warps, nodes, field, values, c, factor, found.camera, found.solver, FINE_SHAPES)
     return replace(finer_one, by_focal=found.by_focal, give=found.give)
 
 
@@ -124,13 +150,13 @@ def with_focal(found: IsometricSheet, focal_px: float) -> IsometricSheet:
     return by_part(replace(found, camera=replace(found.camera, focal_px=focal_px)), np.arange(len(found.coefficients)))
 
 
-def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> IsometricSheet:
+def bundled(found: IsometricSheet, W: Array, rounds: int = MOST_ROUNDS) -> IsometricSheet:
     """The sheet with shapes, lengths and the places of its points on the reference image adjusted together.
 
     Args:
         found: what its keyframes say, image by image.
         W: (F, 2, p) px, its keyframes; anything where not visible.
-        rounds: of shapes with lengths, then places.
+        rounds: of shapes with lengths, then places, at most.
 
     Raises:
         ReconstructionError: a part of it comes out behind the camera.
@@ -138,7 +164,7 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
     seen, shapes, placed = found.warps.weights > 0, found.shapes(), found.warps.placed
     W = np.where(seen[:, None], W, 0.0)
     rays = rays_of(W, found.camera)[:, :2, placed]
-    for _ in range(rounds):
+    for k in range(rounds):
         prior = found.prior_of(shapes, of_others=True)
         weights = found.weighed(shapes, W, seen)
         C = found.bundled(shapes, W, weights, prior, free=True)
@@ -147,9 +173,11 @@ def bundled(found: IsometricSheet, W: Array, rounds: int = BUNDLE_ROUNDS) -> Iso
         places[:, placed] += places_moved(C, rays, weights[:, placed], found.functions[placed], slopes)
         found = found.moved(places)
         found = replace(found, log_lengths=np.median(found.lengths.now(C)[0], axis=0))  # whatever a few frames say
-        usual = float(np.median(found.length_change(C)))
+        usual, earlier = float(np.median(found.length_change(C))), found.usual_change
         found = replace(found, usual_change=usual, give=float(np.clip(usual, GIVE, MOST_GIVE)))
         before, shapes = shapes, C @ found.functions.T
         if np.sqrt(np.nanmean((shapes - before) ** 2)) < SETTLED * np.nanstd(before):
+            break
+        if k + 1 >= USUAL_ROUNDS and usual > FALLING * earlier:
             break
     return found.with_shapes(shapes)

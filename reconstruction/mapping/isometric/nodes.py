@@ -6,9 +6,9 @@ import numpy as np
 
 from reconstruction.arrays import Array, Indices
 from reconstruction.camera import Camera
+from reconstruction.mapping.isometric.images.smooth_field import SmoothField
+from reconstruction.mapping.isometric.images.warps import Warps
 from reconstruction.mapping.isometric.lengths import Edges, edges_of
-from reconstruction.mapping.isometric.smooth_field import SmoothField
-from reconstruction.mapping.isometric.warps import Warps
 
 NODES, NEIGHBOURS = 80, 6
 FINE_NODES, FINE_NEIGHBOURS = 120, 8
@@ -61,6 +61,8 @@ def nodes_of(warps: Warps, *, fine: bool = False) -> Nodes:
     points = warps.few[: FINE_NODES if fine else NODES]
     images = warps.images(points)
     ends = neighbours(images, FINE_NEIGHBOURS if fine else NEIGHBOURS)
+    sides = warps.field.sides(warps.reference[:, points])
+    ends = ends[(sides[ends[:, 0]] == sides[ends[:, 1]]).all(axis=1)]  # across a crease no line keeps its length
     middles = warps.images_at(warps.reference[:, points[ends]].mean(axis=2))
     return Nodes(points, warps.reference[:, points], images, warps.variance(points), ends, middles)
 

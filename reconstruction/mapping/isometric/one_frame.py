@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reconstruction.arrays import Array, Mask
+from reconstruction.mapping.isometric.images.warps import quick_fit
 from reconstruction.mapping.isometric.lengths import finish_depths
 from reconstruction.mapping.isometric.nodes import Nodes, nearest
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.isometric.starts import convex_finish
-from reconstruction.mapping.isometric.warps import quick_fit
 
 RENEWED = 0.3  # weight of the newest frame in the usual change of lengths
 DOUBTED = 1.3  # times the usual change of length: the frame may be in another minimum
@@ -85,7 +85,7 @@ def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, 
     deepest = convex_finish(nodes, edges, sheet.nodes, sheet.coefficients, values, stiffness, sheet.camera)
     starts = np.concatenate([sheet.coefficients[alike], deepest])
     many = edges.frames(np.zeros(len(starts), np.int64))
-    c, costs = finish_depths(many, sheet.log_lengths, starts, stiffness, sheet.bend, STEPS)
+    c, costs = finish_depths(many, sheet.log_lengths, starts, stiffness, sheet.solver.bend, STEPS)
     ends = np.concatenate([shapes, sheet.along_rays(c[costs.argsort()], image[None])])
     depths = np.log(np.maximum(ends[:, 2, nodes.points], 1e-9))
     depths = depths - depths.mean(axis=1, keepdims=True)

@@ -9,11 +9,11 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.bundle import FUNCTIONS, GIVE, Lengths, data_normal, stepped
-from reconstruction.mapping.isometric.lengths import Edges, mean_log_lengths
+from reconstruction.mapping.isometric.images.smooth_field import ENOUGH, GROSS, SmoothField
+from reconstruction.mapping.isometric.images.warps import Warps
+from reconstruction.mapping.isometric.lengths import Edges, Solver, mean_log_lengths
 from reconstruction.mapping.isometric.nodes import USUAL_STRAIN, Nodes, edges_between, on_edges, rays_of
 from reconstruction.mapping.isometric.shape_prior import ShapePrior, shape_prior
-from reconstruction.mapping.isometric.smooth_field import ENOUGH, GROSS, SmoothField
-from reconstruction.mapping.isometric.warps import Warps
 from reconstruction.window.robust import geman_mcclure, lengths
 
 # Lengths of a sheet change by less between its bundled shapes, which hold no noise. By more, they really do (a balloon, a
@@ -36,7 +36,7 @@ class IsometricSheet:
         edge_weights: (n,) 1 for edges that keep their length, near 0 for those that do not.
         strain: (F,) change of length in each frame, weighted rms.
         usual_change: median of that; once keyframes are bundled, of their bundled shapes.
-        bend: weight λ of bending that the depths were found with.
+        solver: with which the depths were found.
         shape_functions: R, of the functions of the images, that bundled shapes are made of.
         camera: the camera.
         give: what lengths of bundled shapes are taken to change by, noise apart.
@@ -52,11 +52,17 @@ class IsometricSheet:
     edge_weights: Array
     strain: Array
     usual_change: float
-    bend: float
+    solver: Solver
     shape_functions: int
     camera: Camera
     give: float = GIVE
     by_focal: float = 0.0
+
+    @property
+    def note(self) -> str:
+        """All that in words."""
+        creases = (f" with {n} crease{'s' if n > 1 else ''}") if (n := len(self.field.creases)) else ""
+        return f"sheet{creases} from {len(self.coefficients)} keyframes, lengths change by {self.strain_rms:.1%}"
 
     @property
     def strain_rms(self) -> float:
@@ -70,6 +76,11 @@ class IsometricSheet:
         weights = self.edge_weights / (1 + squared / USUAL_STRAIN**2)
         by_noise = float((weights * squared).sum() / max(weights.sum(), 1e-12))
         return float(np.sqrt(max(self.strain_rms**2 - by_noise, 0.0)))
+
+    @property
+    def change(self) -> float:
+        """Change of length in units of depth: a sheet much too deep has long lengths, which change by a small share."""
+        return self.strain_rms * float(np.exp(self.log_lengths.mean()))
 
     @cached_property
     def far(self) -> bool:
@@ -224,7 +235,7 @@ def described(
     c: Array,
     factor: Array,
     camera: Camera,
-    bend: float,
+    solver: Solver,
     shape_functions: int = FUNCTIONS,
 ) -> IsometricSheet:
     """The sheet of coefficients (F, r), with its lengths and how well they are kept; weights of edges (n,) by a factor."""
@@ -233,4 +244,4 @@ def described(
     logs = mean_log_lengths(edges, g)
     strain = edges.rms(g - logs)
     usual = float(np.median(strain))
-    return IsometricSheet(warps, nodes, field, values, c, logs, factor, strain, usual, bend, shape_functions, camera)
+    return IsometricSheet(warps, nodes, field, values, c, logs, factor, strain, usual, solver, shape_functions, camera)

@@ -31,6 +31,7 @@ STIFFNESS = 1e-3
 SEEN = 0.3  # weight of an edge that can be relied on
 START_FRAMES = 10
 SOLVER = Solver()
+FROM_PLANES = Solver(grow=3e-5)  # of what is right but for its bends: a pull to short lengths would lead away from it
 # Times its weights of bending and of long lengths, with which depths are held at first. The first is the best start of
 # paper; held so, cloth may get deeper and deeper.
 WAYS = ((100.0, 1.0), (10.0, 1.0), (100.0, 100.0), (1.0, 1.0))
@@ -174,7 +175,7 @@ def depths_without_start(nodes: Nodes, edges: Edges, B: Array, stiffness: Array,
         for bend, grow in WAYS if part.all() and not nodes.far(camera) else WAYS[:1]:
             firm = Solver(bend=bend * SOLVER.bend, grow=grow * SOLVER.grow)
             c = adjust_depths(inside, adjust_depths(inside, deepest, stiffness, firm), stiffness, SOLVER)
-            c = c if part.all() else once_more(edges, edges, c, stiffness)[0]
+            c = c if part.all() else once_more(edges, edges, c, stiffness, SOLVER)[0]
             g = edges.log_lengths(c)
             share = usual(g - mean_log_lengths(edges, g))
             change = float(share * np.exp(g.mean()))
@@ -189,7 +190,7 @@ def depths_without_start(nodes: Nodes, edges: Edges, B: Array, stiffness: Array,
 
 
 def again(
-    nodes: Nodes, seen: Edges, edges: Edges, c: Array, B: Array, stiffness: Array, camera: Camera
+    nodes: Nodes, seen: Edges, edges: Edges, c: Array, B: Array, stiffness: Array, camera: Camera, solver: Solver
 ) -> tuple[Array, Array]:
     """As `once_more`, frames that fell into another minimum started from others that did not, too.
 
@@ -208,10 +209,12 @@ def again(
         deepest, some = c.copy(), nodes.in_frames(stuck)
         deepest[stuck] = convex_finish(some, edges.frames(stuck), nodes.in_frames(good), c[good], B, stiffness, camera)
         starts.append(deepest)
-    return once_more(seen, edges, c, stiffness, starts)
+    return once_more(seen, edges, c, stiffness, solver, starts)
 
 
-def once_more(seen: Edges, edges: Edges, c: Array, stiffness: Array, starts: Sequence[Array] = ()) -> tuple[Array, Array]:
+def once_more(
+    seen: Edges, edges: Edges, c: Array, stiffness: Array, solver: Solver, starts: Sequence[Array] = ()
+) -> tuple[Array, Array]:
     """Adjust once more, each frame from the best of its own and other starts (F, r).
 
     Returns:
@@ -220,6 +223,6 @@ def once_more(seen: Edges, edges: Edges, c: Array, stiffness: Array, starts: Seq
     logs, _, change = robust_lengths(edges, edges.log_lengths(c))
     factor = geman_mcclure(change / (DOUBTFUL * np.median(change) + 1e-12))
     edges = seen.weighted(factor)
-    c = best_start(edges, logs, [c, *starts], stiffness, SOLVER.bend)
+    c = best_start(edges, logs, [c, *starts], stiffness, solver.bend)
     c[:, 0] -= c[:, 0].mean()
-    return adjust_depths(edges, c, stiffness, SOLVER), factor
+    return adjust_depths(edges, c, stiffness, solver), factor

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from reconstruction.mapping.isometric.images.smooth_field import smooth_field
 from reconstruction.mapping.isometric.lengths import Edges, Solver, adjust_depths, cost, edges_of, finish_depths, gradient
-from reconstruction.mapping.isometric.smooth_field import smooth_field
 
 SEEDS = st.integers(0, 10_000).map(np.random.default_rng)
 F, M, R = 4, 25, 8

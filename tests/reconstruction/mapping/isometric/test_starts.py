@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from reconstruction.mapping.isometric.images.smooth_field import smooth_field
+from reconstruction.mapping.isometric.images.warps import smooth_warps
 from reconstruction.mapping.isometric.nodes import edges_between, neighbours, nodes_of, on_edges, rays_of
-from reconstruction.mapping.isometric.smooth_field import smooth_field
 from reconstruction.mapping.isometric.starts import depths_without_start, maximum_depth
-from reconstruction.mapping.isometric.warps import smooth_warps
 from tests.reconstruction.mapping.bending import CAMERA, stretching_sheet, waving_sheet
 
 

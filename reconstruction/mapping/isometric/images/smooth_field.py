@@ -16,12 +16,15 @@ SWEEPS = 3  # more with all functions, the last with all points
 ENOUGH = 0.8  # of the few points that must be seen
 GROSS = 8.0  # times the usual residual: not the same point
 FINEST = 1e-4  # of the image's RMS radius: no residual is usually smaller
+NO_CREASES = np.zeros((0, 3))
+FOLDS_EASILY = 0.01  # stiffness of a crease: hardly any, but with half a sheet in sight it is not needed
 
 
 @dataclass(frozen=True)
 class SmoothField:
-    """The affine functions 1, x, y and the leading eigenfunctions of the thin-plate kernel over m nodes.
+    """The affine functions 1, x, y, two for each crease, and leading eigenfunctions of the thin-plate kernel over m nodes.
 
+    Across a crease shapes are not smooth: its functions are |d| and |d| t, d the distance from it and t the way along it.
     The eigenfunctions are defined everywhere: u_k(x) = √m (Σ_i w_ik |x − x_i|² log|x − x_i| + affine part), with unit
     mean square over the nodes. Coordinates are centred and in units of the nodes' RMS radius.
 
@@ -29,9 +32,10 @@ class SmoothField:
         nodes: (m, 2) in those units.
         centre: (2,) of the nodes, in the image's units.
         radius: RMS distance of the nodes from it.
-        weights: (m, r - 3) kernel weights w, times √m.
-        affine: (3, r - 3) affine parts, times √m.
+        weights: (m, r - 3 - 2k) kernel weights w, times √m.
+        affine: (3, r - 3 - 2k) affine parts, times √m.
         stiffness: (r,) bending energy of each function of unit size, 1 for the softest that bends; 0 for the affine ones.
+        creases: (k, 3) lines n · x = c in the image: unit normal n and c.
     """
 
     nodes: Array
@@ -40,12 +44,14 @@ class SmoothField:
     weights: Array
     affine: Array
     stiffness: Array
+    creases: Array
 
     def at(self, points: Array) -> Array:
         """Values (n, r) of all functions at points (2, n) of the image."""
         x = (points.T - self.centre) / self.radius
         flat = np.column_stack([np.ones(len(x)), x])
-        return np.concatenate([flat, thin_plate(x, self.nodes) @ self.weights + flat @ self.affine], axis=1)
+        bent = thin_plate(x, self.nodes) @ self.weights + flat @ self.affine
+        return np.concatenate([flat, self._folded(points)[0], bent], axis=1)
 
     def slopes_at(self, points: Array) -> Array:
         """Derivatives (n, r, 2) of all functions by the place of points (2, n) of the image."""
@@ -53,7 +59,23 @@ class SmoothField:
         apart = x.T[:, :, None] - self.nodes.T[:, None]  # (2, n, m)
         bent = (apart * (np.log((apart**2).sum(axis=0) + 1e-18) + 1)) @ self.weights + self.affine[1:, None]
         flat = np.broadcast_to(np.eye(3)[1:, None], (2, len(x), 3))
-        return np.asarray(np.concatenate([flat, bent], axis=2).transpose(1, 2, 0) / self.radius)
+        return np.asarray(np.concatenate([flat, self._folded(points)[1], bent], axis=2).transpose(1, 2, 0) / self.radius)
+
+    def sides(self, points: Array) -> Mask:
+        """On which side (n, k) of each crease points (2, n) of the image are."""
+        return np.asarray(self.creases[:, 2] < points.T @ self.creases[:, :2].T)
+
+    def _folded(self, points: Array) -> tuple[Array, Array]:
+        """Values (n, 2k) of the creases' functions at points (2, n), and slopes (2, n, 2k) by the place over the radius."""
+        across = self.creases[:, :2]
+        along = np.column_stack([-across[:, 1], across[:, 0]])
+        d = (points.T @ across.T - self.creases[:, 2]) / self.radius
+        t = (points.T - self.centre) @ along.T / self.radius
+        slopes = np.sign(d) * across.T[:, None]  # of |d|
+        return (
+            np.concatenate([np.abs(d), np.abs(d) * t], axis=1),
+            np.concatenate([slopes, slopes * t + np.abs(d) * along.T[:, None]], axis=2),
+        )
 
 
 def thin_plate(x: Array, y: Array) -> Array:
@@ -62,8 +84,8 @@ def thin_plate(x: Array, y: Array) -> Array:
     return np.asarray(0.5 * squared * np.log(squared + 1e-18))
 
 
-def smooth_field(nodes: Array, functions: int) -> SmoothField:
-    """The field of so many functions over nodes (2, m) of an image; fewer where there are fewer nodes."""
+def smooth_field(nodes: Array, functions: int, creases: Array = NO_CREASES) -> SmoothField:
+    """The field of so many functions over nodes (2, m) of an image, fewer of fewer nodes; and those of creases (k, 3)."""
     centre = nodes.mean(axis=1)
     radius = float(np.sqrt(((nodes.T - centre) ** 2).sum(axis=1).mean()))
     x = (nodes.T - centre) / radius
@@ -76,8 +98,9 @@ def smooth_field(nodes: Array, functions: int) -> SmoothField:
     size = np.sqrt(len(x))
     w = U / values
     affine = -np.linalg.solve(R, Q.T @ (kernel @ w))
-    stiffness = np.concatenate([np.zeros(3), np.abs(values[:1].sum() / values)])
-    return SmoothField(x, centre, radius, w * size, affine * size, stiffness)
+    folds = np.full(2 * len(creases), FOLDS_EASILY)
+    stiffness = np.concatenate([np.zeros(3), folds, np.abs(values[:1].sum() / values)])
+    return SmoothField(x, centre, radius, w * size, affine * size, stiffness, creases)
 
 
 def robust_fit(

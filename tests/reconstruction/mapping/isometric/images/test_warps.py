@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from reconstruction import ReconstructionError
-from reconstruction.mapping.isometric.reference import clearest_image, median, reference_image
-from reconstruction.mapping.isometric.smooth_field import smooth_field
-from reconstruction.mapping.isometric.warps import smooth_warps
+from reconstruction.mapping.isometric.images.reference import clearest_image, median, reference_image
+from reconstruction.mapping.isometric.images.smooth_field import smooth_field
+from reconstruction.mapping.isometric.images.warps import smooth_warps
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 
 

@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.mesh import farthest_points
-from reconstruction.mapping.isometric.smooth_field import robust_fit, smooth_field
+from reconstruction.mapping.isometric.images.smooth_field import robust_fit, smooth_field
 
 FUNCTIONS = 20  # of a field that only says where a point would be in the reference image
 FEWEST = 6  # where images have few points in common

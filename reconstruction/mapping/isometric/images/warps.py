@@ -7,10 +7,11 @@ import numpy as np
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
-from reconstruction.mapping.isometric.reference import reference_image
-from reconstruction.mapping.isometric.smooth_field import (
+from reconstruction.mapping.isometric.images.reference import reference_image
+from reconstruction.mapping.isometric.images.smooth_field import (
     FEW_FUNCTIONS,
     FINEST,
+    NO_CREASES,
     ROUGH_SWEEPS,
     SmoothField,
     robust_fit,
@@ -133,12 +134,19 @@ def smooth_warps(W: Array, visible: Mask) -> Warps:
 
 def finer(warps: Warps, W: Array, visible: Mask) -> Warps:
     """The same images made smooth by more functions."""
-    return on_reference(warps.reference, warps.few, warps.placed, FINE_FUNCTIONS, W, visible)
+    return on_reference(warps.reference, warps.few, warps.placed, FINE_FUNCTIONS, W, visible, warps.field.creases)
 
 
-def on_reference(reference: Array, few: Indices, placed: Mask, functions: int, W: Array, visible: Mask) -> Warps:
+def creased(warps: Warps, W: Array, visible: Mask, creases: Array) -> Warps:
+    """The same images made smooth but for creases (k, 3) in the reference image."""
+    return on_reference(warps.reference, warps.few, warps.placed, FUNCTIONS, W, visible, creases)
+
+
+def on_reference(
+    reference: Array, few: Indices, placed: Mask, functions: int, W: Array, visible: Mask, creases: Array = NO_CREASES
+) -> Warps:
     """Smooth images of W (F, 2, p) px, by visibility (F, p), of so many functions; the others as in `Warps`."""
-    field = smooth_field(reference[:, few[:NODES]], functions)
+    field = smooth_field(reference[:, few[:NODES]], functions, creases)
     values = np.zeros((W.shape[2], len(field.stiffness)))
     values[placed] = field.at(reference[:, placed])
     none, nothing, noise = np.zeros((len(W), 0, 2)), np.zeros((len(W), W.shape[2])), np.ones(len(W))

@@ -1,0 +1,81 @@
+"""Straight creases of a sheet: lines on the reference image across which all other images have kinks."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from reconstruction.arrays import Array
+from reconstruction.mapping.isometric.images.smooth_field import FEW_FUNCTIONS, SmoothField, smooth_field
+from reconstruction.mapping.isometric.images.warps import NODES, Warps
+from reconstruction.window.robust import lengths
+
+MOST = 3
+FAR = 8.0  # times the usual noise: a point is no further off its smooth image than that
+CLEAR = 8.0  # times as much of what smooth functions leave over as chance takes: true creases took 12 to 60 times as much
+BESIDE, LEAST = 0.05, 0.12  # of the radius beside the line, and share of the points that must lie there on either side
+ANGLES, OFFSETS, FARTHEST = 36, 41, 1.6  # of lines tried, the last in units of the radius
+CLOSER = 13  # angles and offsets around the best, in two rounds
+STEPS = 0.09, 0.027  # rad and radii to either side in these
+
+
+def creases_in(warps: Warps, W: Array) -> Array:
+    """Creases (k, 3), see `SmoothField`, of images W (F, 2, p) px, anything where not visible; the clearest first."""
+    few, noise = warps.few, warps.noise_px[:, None]
+    smooth = warps.images(few)
+    off = np.where(warps.weights[:, None, few] > 0, W[:, :, few] - smooth, 0.0)
+    off *= np.minimum(1.0, FAR * noise / np.maximum(lengths(off), 1e-300))[:, None]
+    images, places = (smooth + off).reshape(-1, len(few)).T, warps.reference[:, few]
+    field = smooth_field(places[:, :NODES], FEW_FUNCTIONS)
+    found = np.zeros((0, 3))
+    while len(found) < MOST:
+        known = replace(field, creases=found).at(places)
+        Q = np.linalg.qr(known)[0]
+        left = images - Q @ (Q.T @ images)
+        line, taken = clearest(partial(explained, places, field, Q, left))
+        by_chance = 2 * float((left**2).sum()) / max(len(few) - known.shape[1], 1)
+        if taken < CLEAR * by_chance:
+            break
+        found = np.concatenate([found, in_image(line[None], field)])
+    return found
+
+
+def clearest(takes: Callable[[Array], Array]) -> tuple[Array, float]:
+    """The line (angle, offset in radii) that takes most, and how much that is."""
+    angles, offsets = np.pi * np.arange(ANGLES) / ANGLES, np.linspace(-FARTHEST, FARTHEST, OFFSETS)
+    best = np.zeros(2)
+    for step in (None, *STEPS):
+        if step is not None:
+            angles, offsets = (best[:, None] + step * np.linspace(-1, 1, CLOSER)).reshape(2, -1)
+        lines = np.stack(np.meshgrid(angles, offsets, indexing="ij"), axis=-1).reshape(-1, 2)
+        taken = takes(lines)
+        best = lines[taken.argmax()]
+    return best, float(taken.max())
+
+
+def explained(places: Array, field: SmoothField, Q: Array, left: Array, lines: Array) -> Array:
+    """How much (n,) of what is left over of images (m, 2F) the functions of each of the lines (n, 2) would take.
+
+    Args:
+        places: (2, m) px.
+        field: whose centre and radius count.
+        Q: (m, r) orthonormal functions there that are known already.
+        left: as above.
+        lines: angles and offsets, as above.
+    """
+    x = (places.T - field.centre) / field.radius
+    c, s = np.cos(lines[:, 0]), np.sin(lines[:, 0])
+    d, t = x @ np.stack([c, s]) - lines[:, 1], x @ np.stack([-s, c])
+    both = np.minimum((d > BESIDE).mean(axis=0), (d < -BESIDE).mean(axis=0)) > LEAST
+    first, second = (f - Q @ (Q.T @ f) for f in (np.abs(d), np.abs(d) * t))
+    first /= np.maximum(np.linalg.norm(first, axis=0), 1e-9)
+    second -= first * (first * second).sum(axis=0)
+    second /= np.maximum(np.linalg.norm(second, axis=0), 1e-9)
+    return np.asarray(both * sum(((f.T @ left) ** 2).sum(axis=1) for f in (first, second)))
+
+
+def in_image(lines: Array, field: SmoothField) -> Array:
+    """Lines (n, 2), angle and offset, as creases (n, 3) in the units of the image."""
+    across = np.stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])], axis=1)
+    return np.column_stack([across, lines[:, 1] * field.radius + across @ field.centre])
