@@ -34,7 +34,8 @@ FEW_ROUNDS = 2  # bring most of that in a tenth of a second
 SETTLED = 2e-4  # of the shapes' size: a round that moves them less is the last
 ROUNDS = 6  # at most, of starting frames again that do not fit
 LITTLE_GAIN = 0.1  # of the change: a round that brought less is the last
-KEPT, LESS = 0.004, 0.7  # change of lengths, noise apart, at which creases are believed, and times that of fewer
+CREASED = 0.002  # change of lengths, noise apart, from which on there may be creases;
+KEPT, LESS = 0.004, 0.7  # that at which they are believed, and times the change with fewer of them
 MOST_CHANGE = 0.06  # of lengths, rms, noise apart: no cloth seems to, with folds cut off; less is weighed against a solid
 MOST_AT_ALL = 0.08  # with noise: what is that far off smooth images is not noise
 MOST_PARALLAX = 0.01  # over the image's RMS radius: true sheets up to 0.5 %, by noise; what is seen through 1.5 % and more
@@ -62,7 +63,7 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
     if (parallax := warps.parallax_over_size(W, visible)) > MOST_PARALLAX:
         raise ReconstructionError(f"no smooth surface: points are {parallax:.1%} of its size off it, together")
     found = on_smooth_images(warps, camera)
-    if found.strain_beyond_noise > KEPT:
+    if found.strain_beyond_noise > CREASED:
         creases = creases_in(warps, W)
         for k in range(1, len(creases) + 1):
             found = folding(creased(warps, W, visible, creases[:k]), camera, found)

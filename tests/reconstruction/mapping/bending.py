@@ -52,3 +52,23 @@ def stretching_sheet(
         shapes.append(bent(pulled, rng.uniform(0, np.pi), slope, grid) + np.array([0.0, 0.0, 2.0])[:, None])
     S = np.array(shapes)
     return CAMERA.project(S) + 0.2 * rng.standard_normal((frames, 2, points)), S
+
+
+def folding_sheet(
+    rng: np.random.Generator,
+    creases: tuple[float, ...] = (0.1,),
+    noise_px: float = 0.1,
+    frames: int = 15,
+    points: int = 220,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same of a sheet that is flat but for creases from top to bottom at such places across; each opens and closes."""
+    uv, grid = np.stack([rng.uniform(-0.6, 0.6, points), rng.uniform(-0.45, 0.45, points)]), np.linspace(-0.8, 0.8, 3201)
+    turn, shapes = rng.uniform(0, 2 * np.pi, 4), []
+    for w in 2 * np.pi * np.arange(frames) / frames:
+        folds = [0.7 + 0.6 * np.sin(w + 2 * k) for k in range(len(creases))]
+        slope = sum(fold * ((grid > at) - 0.5) for fold, at in zip(folds, creases, strict=True))
+        R = turned(0.3 * np.sin(w + turn[0]), 0.4 * np.sin(2 * w + turn[1]))
+        shift = np.array([0.1 * np.sin(w + turn[2]), 0.1 * np.cos(w + turn[3]), 2.2])
+        shapes.append(R @ bent(uv, 0.0, np.asarray(slope), grid) + shift[:, None])
+    S = np.array(shapes)
+    return CAMERA.project(S) + noise_px * rng.standard_normal((frames, 2, points)), S
