@@ -63,7 +63,7 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
     if (parallax := warps.parallax_over_size(W, visible)) > MOST_PARALLAX:
         raise ReconstructionError(f"no smooth surface: points are {parallax:.1%} of its size off it, together")
     found = on_smooth_images(warps, camera)
-    if found.strain_beyond_noise > CREASED:
+    if found.strain_beyond_noise > CREASED and not found.far:
         creases = creases_in(warps, W)
         for k in range(1, len(creases) + 1):
             found = folding(creased(warps, W, visible, creases[:k]), camera, found)

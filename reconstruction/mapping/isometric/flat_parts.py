@@ -2,7 +2,7 @@
 
 A homography takes points of a plane in space to those in another frame, too, but for a factor. Of all planes that may have
 been seen in the reference image, the true one is that on which all homographies keep angles and lengths. This needs no
-start, and little perspective tells a plane from its mirror image.
+start, but perspective: without it planes that turn are many.
 """
 
 from dataclasses import dataclass
