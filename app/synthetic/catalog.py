@@ -133,6 +133,20 @@ def creasing(rng: np.random.Generator) -> Shape:
     return lambda places, time: sheet.folded(places, along, 0.9 + 0.6 * np.sin(4 * np.pi * time + a))
 
 
+def leafing(rng: np.random.Generator) -> Shape:
+    """A book that opens and shuts, its back off the middle, its pages bent each in its own way."""
+    along, back, (a, b, c) = rng.uniform(0, np.pi), rng.uniform(-0.12, 0.12), rng.uniform(0, 2 * np.pi, 3)
+
+    def shape(places: Array, time: float) -> Array:
+        t = 4 * np.pi * time
+        fold, bends = 0.7 + 0.45 * np.sin(t + a), 0.6 * np.sin(1.3 * t + np.array([b, c]))
+        return sheet.bent(
+            places, along, lambda arc: np.sign(arc - back) * fold + np.where(arc < back, *bends) * (arc - back)
+        )
+
+    return shape
+
+
 def swelling(rng: np.random.Generator) -> Shape:
     """A balloon that is blown up and let out."""
     a = rng.uniform(0, 2 * np.pi)
@@ -220,6 +234,7 @@ KINDS = {
     "flag": Kind("sheet", flapping, SHEET_TURN),
     "towel": Kind("sheet", drawn_together(UPPER_CORNERS), SHEET_TURN),
     "blanket": Kind("sheet", drawn_together(np.ix_([0, -1], [0, -1])), SHEET_TURN),
+    "book": Kind("sheet", leafing, SHEET_TURN),
     "cone": Kind("sheet", coning, SHEET_TURN, held_back=True),
     "crease": Kind("sheet", creasing, SHEET_TURN, held_back=True),
     "card": Kind("flat", still(flat), SOLID_TURN),

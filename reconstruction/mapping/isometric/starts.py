@@ -31,7 +31,7 @@ STIFFNESS = 1e-3
 SEEN = 0.3  # weight of an edge that can be relied on
 START_FRAMES = 10
 SOLVER = Solver()
-FROM_PLANES = Solver(grow=3e-5)  # of what is right but for its bends: a pull to short lengths would lead away from it
+FROM_PLANES = Solver(grow=1e-5)  # of what is right but for its bends: a pull to short lengths would lead away from it
 # Times its weights of bending and of long lengths, with which depths are held at first. The first is the best start of
 # paper; held so, cloth may get deeper and deeper.
 WAYS = ((100.0, 1.0), (10.0, 1.0), (100.0, 100.0), (1.0, 1.0))
