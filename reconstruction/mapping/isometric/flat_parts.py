@@ -16,7 +16,8 @@ from reconstruction.mapping.isometric.images.warps import Warps
 from reconstruction.mapping.isometric.nodes import rays_of
 
 NORMALS = 3000  # that are tried: 1.5° from one to the next
-STEEPEST = 0.02  # cosine of the angle between a normal and the line of sight
+STEEPEST = 0.25  # cosine of the angle between a normal and a line of sight: points seen at less are hardly followed
+FLAT = 0.1  # mean change of lengths on a part's plane: flat ones have up to 0.05, pages that bend 0.09, folded cloth 0.2
 GROSS = 0.3  # no frame counts for more: lengths along one axis over those along the other, less 1
 FEWEST = 8  # points of a part
 JOINED = 12  # points on either side of a crease by which its sides are put together
@@ -45,7 +46,7 @@ def folded(warps: Warps, camera: Camera) -> Array:
     """Log depths (F, p) of a sheet with creases, flat between them; NaN for points of parts with too few.
 
     Raises:
-        ReconstructionError: no part has enough points.
+        ReconstructionError: no part has enough points, or one is not flat.
     """
     reference = warps.reference
     there, images = rays_of(reference[None], camera)[0], rays_of(warps.images(), camera)
@@ -69,19 +70,26 @@ def folded(warps: Warps, camera: Camera) -> Array:
 
 
 def flat_part(there: Array, images: Array, points: Indices) -> Part:
-    """The part of points that are seen along rays (3, n) in the reference image and (F, 3, n) in the others, third 1."""
+    """The part of points that are seen along rays (3, n) in the reference image and (F, 3, n) in the others, third 1.
+
+    Raises:
+        ReconstructionError: it is not flat.
+    """
     H = homographies(there, images)
     normals = hemisphere(NORMALS)
     normals = normals[(normals @ there > STEEPEST * np.linalg.norm(there, axis=0)).all(axis=1)]
     if not len(normals):
-        raise ReconstructionError("a part is seen from all sides at once")
+        raise ReconstructionError("a part between creases is seen from all sides at once")
     first = np.cross(normals, [0.0, 1.0, 0.0])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     along, across = first @ H.transpose(0, 2, 1), np.cross(normals, first) @ H.transpose(0, 2, 1)
     squares = (along**2).sum(axis=2), (across**2).sum(axis=2)
     size = squares[0] + squares[1]
     off = np.sqrt((squares[0] - squares[1]) ** 2 + 4 * (along * across).sum(axis=2) ** 2) / size
-    best = int(off.clip(max=GROSS).mean(axis=0).argmin())
+    off = off.clip(max=GROSS).mean(axis=0)
+    best = int(off.argmin())
+    if off[best] > FLAT:
+        raise ReconstructionError("a part between creases is not flat")
     return Part(points, normals[best], H / np.sqrt(size[:, best] / 2)[:, None, None])
 
 
