@@ -17,7 +17,7 @@ from reconstruction.mapping.isometric.nodes import rays_of
 
 NORMALS = 3000  # that are tried: 1.5° from one to the next
 STEEPEST = 0.25  # cosine of the angle between a normal and a line of sight: points seen at less are hardly followed
-FLAT = 0.1  # mean change of lengths on a part's plane: flat ones have up to 0.05, pages that bend 0.09, folded cloth 0.2
+FLAT = 0.13  # mean change of lengths on a plane: flat parts have up to 0.05, pages that bend 0.12, cloth 0.15 and more
 GROSS = 0.3  # no frame counts for more: lengths along one axis over those along the other, less 1
 FEWEST = 8  # points of a part
 JOINED = 12  # points on either side of a crease by which its sides are put together
