@@ -64,9 +64,8 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
         raise ReconstructionError(f"no smooth surface: points are {parallax:.1%} of its size off it, together")
     found = on_smooth_images(warps, camera)
     if found.strain_beyond_noise > CREASED and not found.far:
-        creases = creases_in(warps, W)
-        for k in range(1, len(creases) + 1):
-            found = folding(creased(warps, W, visible, creases[:k]), camera, found)
+        for creases in creases_in(warps, W):
+            found = folding(creased(warps, W, visible, creases), camera, found)
     return found
 
 

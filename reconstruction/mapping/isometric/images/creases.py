@@ -13,31 +13,36 @@ from reconstruction.window.robust import lengths
 
 MOST = 3
 FAR = 8.0  # times the usual noise: a point is no further off its smooth image than that
-CLEAR = 8.0  # times as much of what smooth functions leave over as chance takes: true creases took 12 to 60 times as much
+CLEAR = 8.0  # times as much of what smooth functions leave over as chance takes: true creases took 9 to 60 times as much,
+CLIFF = 2.0  # ... and more than so many times what the next line takes
 BESIDE, LEAST = 0.05, 0.12  # of the radius beside the line, and share of the points that must lie there on either side
 ANGLES, OFFSETS, FARTHEST = 36, 41, 1.6  # of lines tried, the last in units of the radius
 CLOSER = 13  # angles and offsets around the best, in two rounds
 STEPS = 0.09, 0.027  # rad and radii to either side in these
 
 
-def creases_in(warps: Warps, W: Array) -> Array:
-    """Creases (k, 3), see `SmoothField`, of images W (F, 2, p) px, anything where not visible; the clearest first."""
+def creases_in(warps: Warps, W: Array) -> list[Array]:
+    """Sets of creases (k, 3), see `SmoothField`, that images W (F, 2, p) px may have, few first; all finite where seen.
+
+    After the last true one all is smooth, and no line takes nearly as much. Where bends are sharp, one line after the other
+    takes a little less: there are none.
+    """
     few, noise = warps.few, warps.noise_px[:, None]
     smooth = warps.images(few)
     off = np.where(warps.weights[:, None, few] > 0, W[:, :, few] - smooth, 0.0)
     off *= np.minimum(1.0, FAR * noise / np.maximum(lengths(off), 1e-300))[:, None]
     images, places = (smooth + off).reshape(-1, len(few)).T, warps.reference[:, few]
     field = smooth_field(places[:, :NODES], FEW_FUNCTIONS)
-    found = np.zeros((0, 3))
-    while len(found) < MOST:
-        known = replace(field, creases=found).at(places)
+    lines, before, found = np.zeros((0, 3)), np.inf, list[Array]()
+    while len(lines) <= MOST and before > CLEAR:
+        known = replace(field, creases=lines).at(places)
         Q = np.linalg.qr(known)[0]
         left = images - Q @ (Q.T @ images)
         line, taken = clearest(partial(explained, places, field, Q, left))
         by_chance = 2 * float((left**2).sum()) / max(len(few) - known.shape[1], 1)
-        if taken < CLEAR * by_chance:
-            break
-        found = np.concatenate([found, in_image(line[None], field)])
+        if len(lines) and before > CLIFF * taken / by_chance:
+            found.append(lines)
+        lines, before = np.concatenate([lines, in_image(line[None], field)]), taken / by_chance
     return found
 
 
