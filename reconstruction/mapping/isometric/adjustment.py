@@ -35,7 +35,7 @@ SETTLED = 2e-4  # of the shapes' size: a round that moves them less is the last
 ROUNDS = 6  # at most, of starting frames again that do not fit
 LITTLE_GAIN = 0.1  # of the change: a round that brought less is the last
 CREASED = 0.002  # change of lengths, noise apart, from which on there may be creases;
-KEPT, LESS = 0.004, 0.7  # that at which they are believed, and times the change with fewer of them
+KEPT, LESS = 0.004, 0.7  # that at which they are believed, and times the change without them
 MOST_CHANGE = 0.06  # of lengths, rms, noise apart: no cloth seems to, with folds cut off; less is weighed against a solid
 MOST_AT_ALL = 0.08  # with noise: what is that far off smooth images is not noise
 MOST_PARALLAX = 0.01  # over the image's RMS radius: true sheets up to 0.5 %, by noise; what is seen through 1.5 % and more
@@ -62,20 +62,20 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
         raise ReconstructionError("a sheet of unknown shape needs 3 keyframes and 20 points")
     if (parallax := warps.parallax_over_size(W, visible)) > MOST_PARALLAX:
         raise ReconstructionError(f"no smooth surface: points are {parallax:.1%} of its size off it, together")
-    found = on_smooth_images(warps, camera)
-    if found.strain_beyond_noise > CREASED and not found.far:
-        for creases in creases_in(warps, W):
-            found = folding(creased(warps, W, visible, creases), camera, found)
-    return found
+    smooth = on_smooth_images(warps, camera)
+    if smooth.strain_beyond_noise <= CREASED or smooth.far:
+        return smooth
+    folds = [folded_sheet(creased(warps, W, visible, creases), camera) for creases in creases_in(warps, W)]
+    best = min((found for found in folds if found), key=lambda found: found.change, default=smooth)
+    return best if best.change < LESS * smooth.change else smooth
 
 
-def folding(warps: Warps, camera: Camera, otherwise: IsometricSheet) -> IsometricSheet:
-    """The sheet with creases, if it keeps its lengths, and much better than a sheet with fewer."""
+def folded_sheet(warps: Warps, camera: Camera) -> IsometricSheet | None:
+    """The sheet with creases that is seen in images, if it keeps its lengths."""
     with suppress(ReconstructionError):
         found = on_smooth_images(warps, camera)
-        if found.strain_beyond_noise < KEPT and found.change < LESS * otherwise.change:
-            return found
-    return otherwise
+        return found if found.strain_beyond_noise < KEPT else None
+    return None
 
 
 def on_smooth_images(warps: Warps, camera: Camera) -> IsometricSheet:
