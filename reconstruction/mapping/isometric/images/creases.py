@@ -39,7 +39,7 @@ def creases_in(warps: Warps, W: Array) -> list[Array]:
         Q = np.linalg.qr(known)[0]
         left = images - Q @ (Q.T @ images)
         line, taken = clearest(partial(explained, places, field, Q, left))
-        by_chance = 2 * float((left**2).sum()) / max(len(few) - known.shape[1], 1)
+        by_chance = max(2 * float((left**2).sum()) / max(len(few) - known.shape[1], 1), np.finfo(float).tiny)
         if len(lines) and before > CLIFF * taken / by_chance:
             found.append(lines)
         lines, before = np.concatenate([lines, in_image(line[None], field)]), taken / by_chance

@@ -42,6 +42,13 @@ def test_smooth_sheets_have_none() -> None:
         assert len(creases_in(smooth_warps(W, np.ones((len(W), W.shape[2]), bool)), W)) == 0
 
 
+def test_images_that_are_smooth_exactly_have_none() -> None:
+    rng = np.random.default_rng(0)
+    plane = rng.uniform(100, 400, (2, 150))
+    W = np.stack([turn @ plane for turn in rng.normal(size=(6, 2, 2)) + 2 * np.eye(2)])
+    assert len(creases_in(smooth_warps(W, np.ones((6, 150), bool)), W)) == 0
+
+
 def test_slopes_across_and_along_a_crease_are_those_of_the_functions() -> None:
     rng = np.random.default_rng(0)
     creases = np.array([[0.6, 0.8, 20.0], [1.0, 0.0, -30.0]])
