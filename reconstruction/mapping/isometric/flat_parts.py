@@ -8,9 +8,10 @@ start, but perspective: without it planes that turn are many.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from reconstruction import ReconstructionError
-from reconstruction.arrays import Array, Indices
+from reconstruction.arrays import Array
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.images.warps import Warps
 from reconstruction.mapping.isometric.nodes import rays_of
@@ -28,12 +29,10 @@ class Part:
     """A part that is flat, and moves by itself.
 
     Attributes:
-        points: (n,) which they are.
         normal: (3,) its plane in the reference image is normal · X = 1, up to its scale.
         motions: (F, 3, 3) of points on that plane to those in frame f.
     """
 
-    points: Indices
     normal: Array
     motions: Array
 
@@ -48,29 +47,31 @@ def folded(warps: Warps, camera: Camera) -> Array:
     Raises:
         ReconstructionError: no part has enough points, or one is not flat.
     """
-    reference = warps.reference
-    there, images = rays_of(reference[None], camera)[0], rays_of(warps.images(), camera)
-    side = warps.field.sides(reference) @ (1 << np.arange(len(warps.field.creases)))
-    groups = [np.flatnonzero(warps.placed & (side == one)) for one in np.unique(side[warps.placed])]
+    reference, few = warps.reference, warps.few
+    there, images = rays_of(reference[None], camera)[0], rays_of(warps.images(few), camera)
+    side = np.where(warps.placed, warps.field.sides(reference) @ (1 << np.arange(len(warps.field.creases))), -1)
+    groups = [np.flatnonzero(side[few] == one) for one in np.unique(side[few])]
     groups = sorted((group for group in groups if len(group) >= FEWEST), key=len, reverse=True)
     if not groups:
         raise ReconstructionError("no part between creases has enough points")
-    parts = [flat_part(there[:, group], images[:, :, group], group) for group in groups]
+    parts = [(few[group], flat_part(there[:, few[group]], images[:, :, group])) for group in groups]
     logs = np.full((len(images), reference.shape[1]), np.nan)
-    logs[:, parts[0].points] = np.log(parts[0].depths(there[:, parts[0].points]))
-    left = parts[1:]
-    while left:  # the nearest first
-        known = np.flatnonzero(np.isfinite(logs[0]))
-        apart = [((reference[:, known, None] - reference[:, None, part.points]) ** 2).sum(axis=0) for part in left]
-        k = int(np.argmin([np.partition(squares.min(axis=0), 1)[1] for squares in apart]))
-        part, near = left.pop(k), known[apart[k].min(axis=1).argsort()[:JOINED]]
-        scale = np.median(logs[:, near] - np.log(part.depths(there[:, near])))
-        logs[:, part.points] = np.log(part.depths(there[:, part.points])) + scale
+    known, scale, k = np.zeros(0, np.int64), 0.0, 0
+    while parts:  # the largest first, then what is nearest to those there are
+        if len(known):
+            nearest = [np.asarray(cKDTree(reference[:, at].T).query(reference[:, known].T)[0]) for at, _ in parts]
+            k = int(np.argmin([np.sort(distances)[1] for distances in nearest]))
+            near = known[nearest[k].argsort()[:JOINED]]
+            scale = float(np.median(logs[:, near] - np.log(parts[k][1].depths(there[:, near]))))
+        points, part = parts.pop(k)
+        own = side == side[points[0]]
+        logs[:, own] = np.log(part.depths(there[:, own])) + scale
+        known = np.concatenate([known, points])
     return logs - np.nanmean(logs)
 
 
-def flat_part(there: Array, images: Array, points: Indices) -> Part:
-    """The part of points that are seen along rays (3, n) in the reference image and (F, 3, n) in the others, third 1.
+def flat_part(there: Array, images: Array) -> Part:
+    """The part whose points are seen along rays (3, n) in the reference image and (F, 3, n) in others, third coordinate 1.
 
     Raises:
         ReconstructionError: it is not flat.
@@ -82,15 +83,13 @@ def flat_part(there: Array, images: Array, points: Indices) -> Part:
         raise ReconstructionError("a part between creases is seen from all sides at once")
     first = np.cross(normals, [0.0, 1.0, 0.0])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
-    along, across = first @ H.transpose(0, 2, 1), np.cross(normals, first) @ H.transpose(0, 2, 1)
-    squares = (along**2).sum(axis=2), (across**2).sum(axis=2)
-    size = squares[0] + squares[1]
-    off = np.sqrt((squares[0] - squares[1]) ** 2 + 4 * (along * across).sum(axis=2) ** 2) / size
-    off = off.clip(max=GROSS).mean(axis=0)
+    along, across = (way @ H.transpose(0, 2, 1) for way in (first, np.cross(normals, first)))
+    one, other, both = ((a * b).sum(axis=2) for a, b in ((along, along), (across, across), (along, across)))
+    off = (np.sqrt((one - other) ** 2 + 4 * both**2) / (one + other)).clip(max=GROSS).mean(axis=0)
     best = int(off.argmin())
     if off[best] > FLAT:
         raise ReconstructionError("a part between creases is not flat")
-    return Part(points, normals[best], H / np.sqrt(size[:, best] / 2)[:, None, None])
+    return Part(normals[best], H / np.sqrt((one + other)[:, best] / 2)[:, None, None])
 
 
 def homographies(there: Array, images: Array) -> Array:

@@ -16,7 +16,7 @@ from tests.reconstruction.mapping.bending import CAMERA, folding_sheet
 def test_a_plane_is_found_where_it_is() -> None:
     rng = np.random.default_rng(0)
     W, S = folding_sheet(rng, (-0.7,), noise_px=0.0)  # nothing is beyond that
-    part = flat_part(rays_of(W[:1], CAMERA)[0], rays_of(W, CAMERA), np.arange(W.shape[2]))
+    part = flat_part(rays_of(W[:1], CAMERA)[0], rays_of(W, CAMERA))
     shapes = part.depths(rays_of(W[:1], CAMERA)[0])[:, None] * rays_of(W, CAMERA)
     assert e3d(shapes, S).max() < 0.02
 
