@@ -27,10 +27,10 @@ from reconstruction.mapping.solid.rivals import Misfit, Rigid, both, rigid_by
 from reconstruction.mapping.start import Start, at_once
 
 Kind = Literal["flat", "solid", "sheet"]
-Surface = Callable[[tuple[Indices, Indices]], tuple[list[tuple[Array, Array, Array]], float]]
+Surface = Callable[[tuple[Indices, Indices]], tuple[list[tuple[Array, Array, Array]], float, int]]
 """Shapes (n, 3, p) of a sheet for both halves of the keyframes: smooth, through the points as seen, and so told lengths.
 
-Those are the other half's. And by how much lengths change in all of them, rms, noise apart.
+Those are the other half's. And by how much lengths change in all of them, rms, noise apart; and how many creases it has.
 """
 
 COMPARED = 80  # points
@@ -41,6 +41,7 @@ SOLID_FREEDOM = 1.1  # a solid must leave so many times less than a plane
 NO_PLANE = 0.1  # of the images' size: what leaves so much over is no plane, whether or not it is a solid of one shape
 LEAST_RELIEF = 0.05  # over the width, both RMS: less is a plane that found a better pose
 SHEET_FREEDOM = 1.2  # a sheet, which bends otherwise in each view, must leave so many times less than anything rigid, ...
+CREASE_FREEDOM = 1.5  # ... and this times more with creases: boxes leave up to 1.6 times less so, books 1.9 and more, ...
 STRETCH_FREEDOM = 150.0  # ... and so many times the share by which it stretches, where a solid explains more than a plane,
 # ... no more where a proven solid turns by less than 45°, or else: flags leave up to half of it, faces 0.6, jaws (51°) half
 FEW_SIDES_DEG, FEW_SIDES_FREEDOM, MOST_FREEDOM = 45.0, 1.85, 3.5
@@ -103,16 +104,16 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     views = [(w[:, :, few], h[:, few]) for w, h in seen]
     at = np.searchsorted(few, edges)
     begun = start(rigid_by, views[0], views[1], camera, at)
-    sheet, change, told_px, stretch = Misfit(np.nan, np.nan), np.nan, np.nan, 0.0
+    sheet, change, told_px, stretch, creases = Misfit(np.nan, np.nan), np.nan, np.nan, 0.0, 0
     if surface is not None:
         with suppress(ReconstructionError):  # no sheet, then
-            shapes, stretch = surface(halves)
+            shapes, stretch, creases = surface(halves)
             sheet, change, told_px = sheet_misfit(shapes, seen, edges)
     rigid: Rigid = begun.result()
-    kind, sureness = decide(rigid, sheet, stretch, told_px)
+    kind, sureness = decide(rigid, sheet, stretch, told_px, creases)
     if sureness < PLAIN:
         rigid = both(rigid, rigid_by(views[1], views[0], camera, at))
-        kind, sureness = decide(rigid, sheet, stretch, told_px)
+        kind, sureness = decide(rigid, sheet, stretch, told_px, creases)
     shape = np.full((3, W.shape[2]), np.nan)
     shape[:, few] = rigid.shape
     turn, relief = rigid.turn_degrees, rigid.relief
@@ -122,7 +123,7 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     )
 
 
-def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan) -> tuple[Kind, float]:
+def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan, creases: int = 0) -> tuple[Kind, float]:
     """The kind, and how many times more the next best leaves.
 
     Rigid shapes compete by the whole; with a sheet, which goes through every point, by the edges, if they are proven. Cloth
@@ -133,6 +134,7 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan)
         sheet: what a sheet does.
         stretch: change of its lengths, rms, noise apart.
         told_px: what it leaves over of frames that are told its lengths.
+        creases: how many it has.
     """
     flat, solid = rigid.flat, rigid.solid
     gain = max(flat.whole_px, 1e-300) / max(SOLID_FREEDOM * solid.whole_px, 1e-300)
@@ -146,7 +148,8 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan)
     if not rigid.proven:  # all of its stretching speaks against a sheet, too
         rigid_px, least, explained, most = min(flat.whole_px, solid.whole_px), 1.0, 1.0, MOST_FREEDOM
     freedom = min(least + STRETCH_FREEDOM * stretch * explained, most)
-    alone, told = (max(np.nan_to_num(px, nan=np.inf), 1e-300) for px in (sheet.edges_px, told_px))
+    more = CREASE_FREEDOM if creases else 1.0
+    alone, told = (more * max(np.nan_to_num(px, nan=np.inf), 1e-300) for px in (sheet.edges_px, told_px))
     sureness = max(rigid_px / (freedom * alone), stiff_px / ((SHEET_FREEDOM + TOLD_FREEDOM * stretch) * told))
     if sureness > 1:
         return "sheet", float(sureness)

@@ -115,14 +115,16 @@ def by_part(found: IsometricSheet, part: Indices) -> IsometricSheet:
     return described(warps, nodes, found.field, found.values, c, factor, found.camera, found.solver, functions)
 
 
-def in_halves(found: IsometricSheet, W: Array, halves: Sequence[Indices]) -> tuple[list[tuple[Array, Array, Array]], float]:
+def in_halves(
+    found: IsometricSheet, W: Array, halves: Sequence[Indices]
+) -> tuple[list[tuple[Array, Array, Array]], float, int]:
     """Shapes of the sheet for both halves of its keyframes W (F, 2, p) px, as model selection asks for them."""
     made = [by_part(found, half) for half in halves]
     shapes = []
     for one, other, half in zip(made, reversed(made), halves, strict=True):
         told = finish_depths(one.edges, other.log_lengths, one.coefficients, one.field.stiffness, one.solver.bend)[0]
         shapes.append((*one.both(W[half]), one.along_rays(told, W[half])))
-    return shapes, found.strain_beyond_noise
+    return shapes, found.strain_beyond_noise, len(found.field.creases)
 
 
 def refined(found: IsometricSheet, W: Array, visible: Mask) -> IsometricSheet:

@@ -115,6 +115,16 @@ def test_frames_that_can_be_told_lengths_show_a_sheet():
     assert decided(Misfit(0.20, 0.20), 0.2, 0.003) == "solid"  # a box, explained up to its noise
 
 
+def test_a_box_is_no_sheet_with_a_crease_but_a_book_is():
+    def decided(solid_px, sheet_px, told_px, creases):
+        rigid = Rigid(Misfit(2.86, 4), Misfit(solid_px, solid_px), 40.0, 0.3)
+        return decide(rigid, Misfit(sheet_px, np.nan), 0.0, told_px, creases)[0]
+
+    assert decided(0.21, 0.16, 0.14, 1) == "solid"
+    assert decided(0.21, 0.16, 0.14, 0) == "sheet"
+    assert decided(0.5, 0.2, 0.16, 1) == "sheet"
+
+
 def test_a_kind_that_only_the_freedom_of_another_decides_is_in_doubt():
     rigid = Rigid(Misfit(2, 4), Misfit(0.6, 2), 30.0, 0.4)
     kind, sureness = decide(rigid, Misfit(0.45, np.nan), stretch=0.01)

@@ -55,7 +55,7 @@ def test_lengths_are_those_of_the_sheet() -> None:
 def test_a_half_of_the_keyframes_can_be_told_the_lengths_of_the_other() -> None:
     W, _, found = waving()
     halves = np.arange(0, len(W), 2), np.arange(1, len(W), 2)
-    shapes, _ = in_halves(found, W, halves)
+    shapes, *_ = in_halves(found, W, halves)
     i, j = found.nodes.points[found.nodes.ends].T
     for (_, through, told), (made, _, _), half in zip(shapes, shapes[::-1], halves, strict=True):
         alone, by_them, theirs = (np.log(np.linalg.norm(S[:, :, i] - S[:, :, j], axis=1)) for S in (through, told, made))
