@@ -136,15 +136,9 @@ def creasing(rng: np.random.Generator) -> Shape:
 def leafing(rng: np.random.Generator) -> Shape:
     """A book that opens and shuts, its back off the middle, its pages bent each in its own way."""
     along, back, (a, b, c) = rng.uniform(0, np.pi), rng.uniform(-0.12, 0.12), rng.uniform(0, 2 * np.pi, 3)
-
-    def shape(places: Array, time: float) -> Array:
-        t = 4 * np.pi * time
-        fold, bends = 0.7 + 0.45 * np.sin(t + a), 0.6 * np.sin(1.3 * t + np.array([b, c]))
-        return sheet.bent(
-            places, along, lambda arc: np.sign(arc - back) * fold + np.where(arc < back, *bends) * (arc - back)
-        )
-
-    return shape
+    return lambda places, time: sheet.opened(
+        places, along, back, 0.7 + 0.45 * np.sin(4 * np.pi * time + a), 0.6 * np.sin(5.2 * np.pi * time + np.array([b, c]))
+    )
 
 
 def swelling(rng: np.random.Generator) -> Shape:

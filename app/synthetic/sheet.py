@@ -57,6 +57,11 @@ def folded(places: Array, along_rad: float, fold_rad: float) -> Array:
     return bent(places, along_rad, lambda arc: np.sign(arc) * fold_rad / 2)
 
 
+def opened(places: Array, along_rad: float, back: float, fold_rad: float, bends: Array) -> Array:
+    """Shape (n, 3) of places (n, 2) on a book, each page turned back by so much where its back is, and bent (2,)."""
+    return bent(places, along_rad, lambda arc: np.sign(arc - back) * fold_rad + np.where(arc < back, *bends) * (arc - back))
+
+
 def torn(places: Array, down_to: float, bend: float) -> Array:
     """Shape (n, 3) of places (n, 2) on a sheet torn in its middle from above down to a y, each half bent there by so much.
 

@@ -21,7 +21,7 @@ def keyframes(rng, shapes, camera=PERSPECTIVE, degrees=25.0, noise=0.2):
 def surface_of(placed, rng, off=0.3):
     """What a good maker of sheets would find, of one that does not stretch; seen `off` px beside it."""
     through = placed + off * rng.normal(size=placed.shape)
-    return lambda halves: ([(placed[half], through[half], through[half]) for half in halves], 0.0)
+    return lambda halves: ([(placed[half], through[half], through[half]) for half in halves], 0.0, 0)
 
 
 @given(SEEDS)
