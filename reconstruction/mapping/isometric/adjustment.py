@@ -25,11 +25,8 @@ from reconstruction.mapping.isometric.sheet import IsometricSheet, described
 from reconstruction.mapping.isometric.starts import FROM_PLANES, SOLVER, again, coefficients_of, first_depths, once_more
 
 FUNCTIONS, FINE_FUNCTIONS = 40, 60
-MOST_ROUNDS, USUAL_ROUNDS = (
-    60,
-    12,
-)  # of shapes with lengths, then places; more than usual only where
-FALLING = 0.99  # ... lengths change by less than so many times what they changed by a round before
+USUAL_ROUNDS, MOST_ROUNDS = 12, 60  # of shapes with lengths, then places; more than usual where they still bring much:
+FALLING = 0.99  # lengths change by less than so many times what they changed by a round before
 FEW_ROUNDS = 2  # bring most of that in a tenth of a second
 SETTLED = 2e-4  # of the shapes' size: a round that moves them less is the last
 ROUNDS = 6  # at most, of starting frames again that do not fit

@@ -48,15 +48,18 @@ def creases_in(warps: Warps, W: Array) -> list[Array]:
 
 def clearest(takes: Callable[[Array], Array]) -> tuple[Array, float]:
     """The line (angle, offset in radii) that takes most, and how much that is."""
-    angles, offsets = np.pi * np.arange(ANGLES) / ANGLES, np.linspace(-FARTHEST, FARTHEST, OFFSETS)
-    best = np.zeros(2)
-    for step in (None, *STEPS):
-        if step is not None:
-            angles, offsets = (best[:, None] + step * np.linspace(-1, 1, CLOSER)).reshape(2, -1)
-        lines = np.stack(np.meshgrid(angles, offsets, indexing="ij"), axis=-1).reshape(-1, 2)
+    lines = grid(np.pi * np.arange(ANGLES) / ANGLES, np.linspace(-FARTHEST, FARTHEST, OFFSETS))
+    best = lines[takes(lines).argmax()]
+    for step in STEPS:
+        lines = grid(*(best[:, None] + step * np.linspace(-1, 1, CLOSER)))
         taken = takes(lines)
         best = lines[taken.argmax()]
     return best, float(taken.max())
+
+
+def grid(angles: Array, offsets: Array) -> Array:
+    """All lines (n, 2) of such angles and offsets."""
+    return np.stack(np.meshgrid(angles, offsets, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def explained(places: Array, field: SmoothField, Q: Array, left: Array, lines: Array) -> Array:
