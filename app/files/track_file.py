@@ -22,7 +22,10 @@ def load_tracks(path: Path) -> Tracks:
     Raises:
         TrackingError: the file is missing, damaged, lacks `W`, or its arrays do not fit.
     """
-    arrays = _named(read_arrays(path))
+    return _tracks(_named(read_arrays(path)), path)
+
+
+def _tracks(arrays: Arrays, path: Path) -> Tracks:
     if "W" not in arrays:
         problem = f"{path} has no array W (frames, 2, points), only {_names(arrays)}"
         if "W_px" in arrays:
@@ -56,7 +59,7 @@ def load_truth(path: Path) -> Truth:
     if missing:
         raise TrackingError(f"{path} is no truth: no array {', '.join(missing)}, only {_names(arrays)}")
     if "W_px" not in arrays:
-        tracks = load_tracks(path)
+        tracks = _tracks(arrays, path)
         assert tracks.S_gt is not None
         assert tracks.gt_frames is not None
         return Truth(tracks.W[tracks.gt_frames], tracks.S_gt, tracks.gt_frames, tracks.K)

@@ -72,9 +72,7 @@ def explained(places: Array, field: SmoothField, Q: Array, left: Array, lines: A
         left: as above.
         lines: angles and offsets, as above.
     """
-    x = (places.T - field.centre) / field.radius
-    c, s = np.cos(lines[:, 0]), np.sin(lines[:, 0])
-    d, t = x @ np.stack([c, s]) - lines[:, 1], x @ np.stack([-s, c])
+    d, t = replace(field, creases=in_image(lines, field)).beside(places)
     both = np.minimum((d > BESIDE).mean(axis=0), (d < -BESIDE).mean(axis=0)) > LEAST
     first, second = (f - Q @ (Q.T @ f) for f in (np.abs(d), np.abs(d) * t))
     first /= np.maximum(np.linalg.norm(first, axis=0), 1e-9)

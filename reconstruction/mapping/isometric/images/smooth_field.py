@@ -51,7 +51,8 @@ class SmoothField:
         x = (points.T - self.centre) / self.radius
         flat = np.column_stack([np.ones(len(x)), x])
         bent = thin_plate(x, self.nodes) @ self.weights + flat @ self.affine
-        return np.concatenate([flat, self._folded(points)[0], bent], axis=1)
+        d, t = self.beside(points)
+        return np.concatenate([flat, np.abs(d), np.abs(d) * t, bent], axis=1)
 
     def slopes_at(self, points: Array) -> Array:
         """Derivatives (n, r, 2) of all functions by the place of points (2, n) of the image."""
@@ -59,23 +60,24 @@ class SmoothField:
         apart = x.T[:, :, None] - self.nodes.T[:, None]  # (2, n, m)
         bent = (apart * (np.log((apart**2).sum(axis=0) + 1e-18) + 1)) @ self.weights + self.affine[1:, None]
         flat = np.broadcast_to(np.eye(3)[1:, None], (2, len(x), 3))
-        return np.asarray(np.concatenate([flat, self._folded(points)[1], bent], axis=2).transpose(1, 2, 0) / self.radius)
+        d, t = self.beside(points)
+        across, along = self.creases[:, :2].T[:, None], self._along.T[:, None]
+        first, second = np.sign(d) * across, np.sign(d) * across * t + np.abs(d) * along
+        return np.asarray(np.concatenate([flat, first, second, bent], axis=2).transpose(1, 2, 0) / self.radius)
 
     def sides(self, points: Array) -> Mask:
         """On which side (n, k) of each crease points (2, n) of the image are."""
         return np.asarray(self.creases[:, 2] < points.T @ self.creases[:, :2].T)
 
-    def _folded(self, points: Array) -> tuple[Array, Array]:
-        """Values (n, 2k) of the creases' functions at points (2, n), and slopes (2, n, 2k) by the place over the radius."""
-        across = self.creases[:, :2]
-        along = np.column_stack([-across[:, 1], across[:, 0]])
-        d = (points.T @ across.T - self.creases[:, 2]) / self.radius
-        t = (points.T - self.centre) @ along.T / self.radius
-        slopes = np.sign(d) * across.T[:, None]  # of |d|
-        return (
-            np.concatenate([np.abs(d), np.abs(d) * t], axis=1),
-            np.concatenate([slopes, slopes * t + np.abs(d) * along.T[:, None]], axis=2),
-        )
+    def beside(self, points: Array) -> tuple[Array, Array]:
+        """How far points (2, n) of the image are from each crease, and how far along it: (n, k) each, in radii."""
+        d = (points.T @ self.creases[:, :2].T - self.creases[:, 2]) / self.radius
+        return d, (points.T - self.centre) @ self._along.T / self.radius
+
+    @property
+    def _along(self) -> Array:
+        """(k, 2) unit vectors along the creases."""
+        return np.column_stack([-self.creases[:, 1], self.creases[:, 0]])
 
 
 def thin_plate(x: Array, y: Array) -> Array:
