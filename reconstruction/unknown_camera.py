@@ -3,7 +3,8 @@
 from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera, lens
 from reconstruction.mapping.keyframes import Keyframes, thinned
-from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.map import Map
+from reconstruction.mapping.maps import map_of
 from reconstruction.mapping.selection import Kind
 
 USUAL_LENS = 5.0  # focal length over the object's size, RMS: of what fills half a picture

@@ -1,1 +1,1 @@
-"""What the object is: its rest shape and its camera, by the first frames (paper §4), and by keyframes of all of them."""
+"""What the object is: its rest shape and its camera, by keyframes of all frames."""

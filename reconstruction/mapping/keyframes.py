@@ -12,7 +12,7 @@ FEWEST_SHARED = 12  # points that two frames must share to be compared
 FEWEST_SEEN = 0.25  # of the points that another frame showed it must show
 SWEEPS = 3  # of re-weighting, against gross errors
 TINY = 1e-12  # squared difference, relative, that counts as none
-ENOUGH = 2000  # points to compare by
+ENOUGH = 1000  # points to compare by
 
 
 class Keyframes:
@@ -122,8 +122,8 @@ def difference(W: Array, visible: Mask, others: Array, others_visible: Mask) -> 
 
 
 def thinned(points: int) -> Indices:
-    """Some of so many points, at most about `ENOUGH`: of dense ones every so many tell as much."""
-    return np.arange(0, points, 1 + points // ENOUGH)
+    """Some of so many points, at most `ENOUGH`: of dense ones every so many tell as much."""
+    return np.arange(0, points, -(-points // ENOUGH))
 
 
 def nearest_pair(apart: Array) -> tuple[int, int, float]:

@@ -12,11 +12,11 @@ import numpy as np
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
-from reconstruction.mapping.bootstrap import bootstrap
-from reconstruction.mapping.keyframes import KEYFRAMES, Keyframes, difference, spread_of
-from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.first.bootstrap import bootstrap
+from reconstruction.mapping.keyframes import KEYFRAMES, Keyframes, spread_of
+from reconstruction.mapping.map import Map, nearest_first
+from reconstruction.mapping.maps import map_of
 from reconstruction.mapping.selection import Kind
-from reconstruction.mapping.solid.bundle import seen_by
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import FIRST_LOOKS, Settings
@@ -213,14 +213,6 @@ class Mapper:
 def stacked(frames: list[tuple[Array, Mask]]) -> tuple[Array, Mask]:
     """Frames' points as (F, 2, p) px, visible (F, p)."""
     return np.stack([W for W, _ in frames]), np.stack([visible for _, visible in frames])
-
-
-def nearest_first(found: Map, W: Array, visible: Mask) -> Map:
-    """A map with that pose first in which its rest shape looks most like an image (2, p) px, visible (p,)."""
-    image = seen_by(found.camera, found.rest.motion)
-    every = np.ones((len(image), W.shape[1]), np.bool_)
-    order = np.argsort(difference(np.where(visible, W, 0.0), visible, image, every), kind="stable")
-    return found.in_order(order)
 
 
 def with_modes(make: Callable[..., Map | None], settings: Settings, *arguments: object) -> Map | None:

@@ -11,7 +11,7 @@ finds lengths by itself, which few views may leave open, and where one is told t
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -79,6 +79,12 @@ class Evidence(Rigid):
         lengths = "" if np.isnan(self.length_change) else f"; lengths change by {self.length_change:.1%}"
         solid = f"turn {self.turn_degrees:.0f}°, relief {self.relief:.2f}"
         return f"{self.kind}: left over on other keyframes {left} px{lengths}; {solid}"
+
+    def among(self, some: Indices, points: int) -> "Evidence":
+        """The same of so many points, where it was found by some of them."""
+        shape = np.full((3, points), np.nan)
+        shape[:, some] = self.shape
+        return replace(self, shape=shape)
 
 
 def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = None, start: Start = at_once) -> Evidence:

@@ -8,7 +8,7 @@ import pytest
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d, with_missing, with_outliers
-from reconstruction.mapping.evidence import weigh
+from reconstruction.mapping.first.evidence import weigh
 from reconstruction.online import Phase, Reconstruction
 from reconstruction.settings import Deformation, Settings
 from tests.reconstruction.runs import (

@@ -9,7 +9,7 @@ import pytest
 
 from reconstruction.camera import Camera
 from reconstruction.mapping.isometric.sheet import IsometricSheet
-from reconstruction.mapping.map import map_of
+from reconstruction.mapping.maps import map_of
 from reconstruction.mapping.selection import Evidence
 from reconstruction.mapping.solid.rivals import Misfit
 from reconstruction.unknown_camera import changes, likely_camera

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.rest_shape import RigidMotion
-from reconstruction.mapping.factorization import factorize
+from reconstruction.mapping.first.factorization import factorize
 from reconstruction.mapping.outliers import medians
 from reconstruction.mapping.solid.adjustment import Adjustment, adjust
 from reconstruction.mapping.solid.bundle import Bundle, Loss, prior_of

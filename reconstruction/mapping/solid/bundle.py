@@ -16,7 +16,7 @@ import numpy as np
 from reconstruction.arrays import Array, Indices
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera, farness, quaternion_exp, rotation_from_quaternion
-from reconstruction.mapping.evidence import extent
+from reconstruction.mapping.first.evidence import extent
 
 POSE = 6  # θ, t, log s of a view
 HALF_WIDTH = 0.5  # relief over width that is as deep as is believed without proof

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
@@ -102,8 +103,8 @@ def beside_others(W: Array, seen: Mask, bundle: Bundle, points: Mask) -> Array:
         if not len(known):
             continue
         depth = m.s[k] * (m.R[k, 2] @ shape[:, known])
-        apart = np.linalg.norm(W[k][:, new, None] - W[k][:, None, known], axis=0)
-        deep = np.median(depth[np.argsort(apart, axis=1)[:, :BESIDE]], axis=1)
+        beside = cKDTree(W[k][:, known].T).query(W[k][:, new].T, range(1, 1 + min(BESIDE, len(known))))[1]
+        deep = np.median(depth[beside], axis=1)
         ray = W[k][:, new] * (1 + bundle.kappa * deep) - m.t[k][:, None]
         shape[:, new] = m.R[k].T @ np.concatenate([ray, deep[None]]) / m.s[k]
     return shape

@@ -8,8 +8,8 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera
-from reconstruction.mapping.evidence import TURN_DEGREES
-from reconstruction.mapping.factorization import view_turn_degrees
+from reconstruction.mapping.first.evidence import TURN_DEGREES
+from reconstruction.mapping.first.factorization import view_turn_degrees
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.bundle import HALF_WIDTH, Bundle, scaled
 from reconstruction.mapping.solid.growth import growth_from

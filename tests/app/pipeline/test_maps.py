@@ -10,7 +10,7 @@ from app.pipeline.stages.maps import MapProcess
 from app.terminal.errors import UsageError
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
-from reconstruction.mapping.bootstrap import bootstrap
+from reconstruction.mapping.first.bootstrap import bootstrap
 from reconstruction.settings import Settings
 from tests.reconstruction.runs import PERSPECTIVE, swelling_hill
 

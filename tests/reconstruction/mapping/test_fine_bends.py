@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from reconstruction.evaluation import e3d
-from reconstruction.mapping import map as maps
-from reconstruction.mapping.map import map_of
+from reconstruction.mapping import maps
+from reconstruction.mapping.maps import map_of
 from reconstruction.mapping.selection import Evidence, Surface
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 from tests.reconstruction.mapping.test_map import FRAMES, POINTS, waving

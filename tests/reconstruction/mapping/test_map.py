@@ -12,7 +12,8 @@ from reconstruction.basis.model import build_model
 from reconstruction.basis.rest_shape import completed, given, medoid
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
-from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.map import Map
+from reconstruction.mapping.maps import map_of
 from reconstruction.mapping.solid.solid import Solid, bundle_adjust
 from reconstruction.online import Reconstruction
 from reconstruction.settings import Settings
@@ -216,7 +217,7 @@ def test_what_lies_behind_the_camera_is_no_map(monkeypatch: pytest.MonkeyPatch) 
     def behind(*asked: Any, **how: Any) -> Solid:
         return replace(bundle_adjust(*asked, **how), energy=np.inf)
 
-    monkeypatch.setattr("reconstruction.mapping.map.bundle_adjust", behind)
+    monkeypatch.setattr("reconstruction.mapping.maps.bundle_adjust", behind)
     assert map_of(W, visible, PERSPECTIVE, estimate_focal=False) is None
 
 

@@ -9,15 +9,17 @@ from reconstruction.basis.model import Model
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import quaternion_from_rotation, rotation_from_quaternion
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.solid.bundle import seen_by
+from reconstruction.mapping.solid.bundle import Bundle, seen_by
 from reconstruction.mapping.solid.deforming.deformations import Learned, going_with_turn
 from reconstruction.mapping.solid.deforming.learning import POINTS, ROUNDS, learned
 from reconstruction.mapping.solid.deforming.own_motion import own_motion
-from reconstruction.mapping.solid.placing import well_spread
+from reconstruction.mapping.solid.placing import located, well_spread
 from reconstruction.settings import MOST_MODES, Settings
 from reconstruction.state import State, join
 from reconstruction.window.energy import build_energy
 from reconstruction.window.window import SlidingWindow
+
+SETTLED = 8  # rounds of learning that remain where all points follow what some have told
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,13 @@ class Shown:
     visible: Mask
     sound: Mask
     frames: Indices
+
+    def of_points(self, some: Indices) -> "Shown":
+        """The same of some points only."""
+        rest, visible = self.rigid.rest, self.visible[:, some]
+        rest = replace(rest, motion=replace(rest.motion, shape=rest.motion.shape[:, some]))
+        rigid = replace(self.rigid, rest=rest, seen=visible, model=None)
+        return replace(self, rigid=rigid, W=self.W[:, :, some], visible=visible, sound=self.sound[:, some])
 
     def learned(self, model: Model, state: State, log_s: Array, rounds: int = ROUNDS, points: int = POINTS) -> Learned:
         """What they tell; arguments as for `learning.learned`, which says what is raised."""
@@ -75,8 +84,8 @@ class Attempt:
         deformations = replace(self.known.deformations, turning=going_with_turn(state))
         return replace(found, rest=rest, modes=len(model.basis.eigenvalues), model=model, deformations=deformations)
 
-    def carried(self, again: Model) -> State:
-        """Pose and Λ' of keyframes in the modes of another model, about the same rest shape."""
+    def carried(self, again: Model, points: Indices | slice = slice(None)) -> State:
+        """Pose and Λ' of keyframes in the modes of another model, about the same rest shape: of `points` of it."""
         model, state = self.model, self.known.state
         turn = again.basis.Phi.T @ model.basis.Phi
         deformed = turn @ state.Lambda @ self.known.B[3:-1] * (model.radius / again.radius)
@@ -84,7 +93,7 @@ class Attempt:
             quaternion_from_rotation(rotation_from_quaternion(state.q) @ turn.T),
             state.t * (model.radius_px / again.radius_px),
             state.log_s + np.log(model.scale / again.scale),
-            deformed @ np.linalg.pinv(again.B[3:-1]),
+            deformed @ np.linalg.pinv(again.B[3:-1, points]),
         )
 
     def scales(self, again: Model) -> Array:
@@ -100,6 +109,23 @@ def gone_on(attempt: Attempt, shown: Shown, modes: int = MOST_MODES, rounds: int
     again = modelled(attempt.about(shown.rigid), shown, modes)
     log_s = attempt.scales(again)
     return Attempt(again, shown.learned(again, attempt.carried(again), log_s, rounds, points), log_s)
+
+
+def among_all(attempt: Attempt, some: Indices, shown: Shown) -> Attempt:
+    """What has been learned by some of the points, for all of them: they are placed where keyframes posed so show them.
+
+    Arguments as for `gone_on`.
+    """
+    rigid, others = shown.rigid, np.ones(shown.W.shape[2], np.bool_)
+    others[some] = False
+    motion, kappa = attempt.about(rigid).rest.motion, 1 / rigid.camera.focal_px
+    shape = np.zeros((3, len(others)))
+    shape[:, some] = motion.shape
+    seen = shown.W - rigid.camera.center_px[:, None], shown.sound.astype(np.float64)
+    placed = located(*seen, Bundle(replace(motion, shape=shape), kappa), others, flat=False)
+    again = modelled(replace(rigid, rest=replace(rigid.rest, motion=placed.motion)), shown, len(attempt.model.B) - 4)
+    log_s = attempt.scales(again)
+    return Attempt(again, shown.learned(again, attempt.carried(again, some), log_s, SETTLED), log_s)
 
 
 def modelled(found: Map, shown: Shown, modes: int = MOST_MODES) -> Model:

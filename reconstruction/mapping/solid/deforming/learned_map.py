@@ -9,10 +9,11 @@ from reconstruction.basis.model import Model
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.outliers import without_outliers
 from reconstruction.mapping.solid.bundle import seen_by
-from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, begun, gone_on
+from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, among_all, begun, gone_on
 from reconstruction.mapping.solid.deforming.deformations import Learned
 from reconstruction.mapping.solid.deforming.learning import RIGHTED, learned
 from reconstruction.mapping.solid.deforming.starts import likeliest
+from reconstruction.mapping.solid.placing import well_spread
 from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import MORE_MODES, MOST_MODES, Settings
 from reconstruction.window.robust import lengths
@@ -52,11 +53,13 @@ def with_deformations(
         return found
     order = np.argsort(frames)
     W, visible = np.where(visible[:, None], W, 0.0)[order], visible[order]
-    sound, rigid = without_outliers(W, visible), found.in_order(order)
+    every = Shown(found.in_order(order), settings, W, visible, without_outliers(W, visible), frames[order])
+    some = well_spread(every.rigid.rest.motion.shape, every.sound)
+    shown = every if len(some) == W.shape[2] else every.of_points(some)
+    W, visible, rigid = shown.W, shown.visible, shown.rigid
     try:
-        shown = Shown(rigid, settings, W, visible, sound, frames[order])
         model, first = begun(rigid, shown, MOST_MODES if last else MORE_MODES)
-        hidden = sound & (np.random.default_rng(0).random(visible.shape) < HIDDEN)
+        hidden = shown.sound & (np.random.default_rng(0).random(visible.shape) < HIDDEN)
         trial = learned(model, W, visible & ~hidden, first, first.log_s, TRIAL)
         if not predicted(model, W, hidden, trial, rigid):
             return found
@@ -65,9 +68,11 @@ def with_deformations(
             end, otherwise = likeliest(start, shown, begin)
         else:
             end = gone_on(start, shown, MORE_MODES, FEW_ROUNDS)
+        if shown is not every:
+            end = among_all(end, some, every)
     except np.linalg.LinAlgError:  # of points that lie as none do
         return found
-    known = end.about(rigid)
+    known = end.about(every.rigid)
     assert known.deformations
     return replace(known, deformations=replace(known.deformations, otherwise=otherwise)).in_order(np.argsort(order))
 

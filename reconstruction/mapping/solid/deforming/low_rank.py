@@ -12,7 +12,7 @@ import numpy as np
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import nearest_rotation
-from reconstruction.mapping.factorization import rotations_from_rows
+from reconstruction.mapping.first.factorization import rotations_from_rows
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.deforming.learning import POINTS
 from reconstruction.mapping.solid.placing import located, well_spread

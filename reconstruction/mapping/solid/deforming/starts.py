@@ -9,7 +9,7 @@ import numpy as np
 
 from reconstruction.basis.rest_shape import RigidMotion, apart
 from reconstruction.camera import nearest_rotation
-from reconstruction.mapping.factorization import rotations_from_rows
+from reconstruction.mapping.first.factorization import rotations_from_rows
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, begun, gone_on
 from reconstruction.mapping.solid.deforming.learning import RIGHTED

@@ -8,8 +8,9 @@ from reconstruction.basis.model import facing
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
-from reconstruction.mapping.map import Map, map_of
+from reconstruction.mapping.map import Map
 from reconstruction.mapping.mapper import on_the_way
+from reconstruction.mapping.maps import map_of
 from reconstruction.mapping.solid.deforming import learned_map, rounds
 from reconstruction.mapping.solid.deforming.attempt import Shown, begun
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations

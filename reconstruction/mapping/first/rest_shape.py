@@ -8,7 +8,7 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera
-from reconstruction.mapping.evidence import (
+from reconstruction.mapping.first.evidence import (
     STILL,
     TURN_DEGREES,
     apparent_change,
@@ -16,8 +16,8 @@ from reconstruction.mapping.evidence import (
     foreshortening_degrees,
     judging_points,
 )
-from reconstruction.mapping.factorization import affine_structure, factorize, view_turn_degrees
-from reconstruction.mapping.rigid import bundle_adjust
+from reconstruction.mapping.first.factorization import affine_structure, factorize, view_turn_degrees
+from reconstruction.mapping.first.rigid import bundle_adjust
 from reconstruction.mapping.solid import solid
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.placing import beside_others

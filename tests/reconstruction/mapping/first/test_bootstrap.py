@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reconstruction.mapping.bootstrap import bootstrap
+from reconstruction.mapping.first.bootstrap import bootstrap
 from reconstruction.settings import Settings
 from tests.reconstruction.runs import swelling_hill
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, bending_sheet

@@ -6,9 +6,9 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
-from reconstruction.mapping import rest_shape
-from reconstruction.mapping.evidence import TURN_DEGREES, weigh
-from reconstruction.mapping.factorization import view_turn_degrees
+from reconstruction.mapping.first import rest_shape
+from reconstruction.mapping.first.evidence import TURN_DEGREES, weigh
+from reconstruction.mapping.first.factorization import view_turn_degrees
 from reconstruction.mapping.keyframes import FEWEST_SEEN
 from reconstruction.mapping.map import ASSUMED, Map
 from reconstruction.mapping.outliers import without_outliers

@@ -8,7 +8,7 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.mesh import farthest_points
 from reconstruction.basis.rest_shape import apart
-from reconstruction.mapping.factorization import Factorization, factorize, view_turn_degrees
+from reconstruction.mapping.first.factorization import Factorization, factorize, view_turn_degrees
 
 TURN_DEGREES = 10.0  # less turn than this and depth drowns in noise
 RELIEF_OVER_NOISE = 3.0  # third over fourth singular value of the observations

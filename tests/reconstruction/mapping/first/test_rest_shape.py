@@ -6,11 +6,11 @@ from hypothesis import given, settings
 
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
-from reconstruction.mapping import rest_shape
-from reconstruction.mapping.evidence import weigh
-from reconstruction.mapping.factorization import view_turn_degrees
-from reconstruction.mapping.rest_shape import first_image
-from reconstruction.mapping.rest_shape import tilted_sheet as sheet
+from reconstruction.mapping.first import rest_shape
+from reconstruction.mapping.first.evidence import weigh
+from reconstruction.mapping.first.factorization import view_turn_degrees
+from reconstruction.mapping.first.rest_shape import first_image
+from reconstruction.mapping.first.rest_shape import tilted_sheet as sheet
 from tests.reconstruction.world import (
     CAMERAS,
     ORTHOGRAPHIC,

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reconstruction import ReconstructionError
-from reconstruction.mapping.factorization import (
+from reconstruction.mapping.first.factorization import (
     affine_structure,
     factorize,
     metric_upgrade,

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.camera import Camera
-from reconstruction.mapping.factorization import factorize
-from reconstruction.mapping.rigid import bundle_adjust, reprojection_rms, solve_points
+from reconstruction.mapping.first.factorization import factorize
+from reconstruction.mapping.first.rigid import bundle_adjust, reprojection_rms, solve_points
 from tests.reconstruction.world import CAMERAS, PERSPECTIVE, SEEDS, random_rotation, relief, shape_error, turns
 
 FRAMES, POINTS = 14, 40

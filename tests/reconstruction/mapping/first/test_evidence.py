@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from reconstruction.mapping.evidence import apparent_change, foreshortening_degrees, judging_points, weigh
+from reconstruction.mapping.first.evidence import apparent_change, foreshortening_degrees, judging_points, weigh
 from tests.reconstruction.world import ORTHOGRAPHIC, SEEDS, flat, relief, rolled, seen, turn, turns, views
 
 FRAMES, POINTS = 15, 60

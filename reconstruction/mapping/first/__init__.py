@@ -1,0 +1,1 @@
+"""The first model, by the first frames alone: a rigid shape by factorisation, or a plane (paper §4)."""
