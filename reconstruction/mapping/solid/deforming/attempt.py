@@ -123,7 +123,8 @@ def among_all(attempt: Attempt, some: Indices, shown: Shown) -> Attempt:
     shape[:, some] = motion.shape
     seen = shown.W - rigid.camera.center_px[:, None], shown.sound.astype(np.float64)
     placed = located(*seen, Bundle(replace(motion, shape=shape), kappa), others, flat=False)
-    again = modelled(replace(rigid, rest=replace(rigid.rest, motion=placed.motion)), shown, len(attempt.model.B) - 4)
+    found = replace(rigid, rest=replace(rigid.rest, motion=placed.motion))
+    again = modelled(found, shown, len(attempt.model.basis.eigenvalues))
     log_s = attempt.scales(again)
     return Attempt(again, shown.learned(again, attempt.carried(again, some), log_s, SETTLED), log_s)
 
