@@ -122,8 +122,8 @@ def difference(W: Array, visible: Mask, others: Array, others_visible: Mask) -> 
 
 
 def thinned(points: int) -> Indices:
-    """Some of so many points, at most `ENOUGH`: of dense ones every so many tell as much."""
-    return np.arange(0, points, -(-points // ENOUGH))
+    """Some of so many points, at most `ENOUGH`, ascending: more tell no more. At random: they may lie in rows."""
+    return np.sort(np.random.default_rng(0).choice(points, min(points, ENOUGH), replace=False))
 
 
 def nearest_pair(apart: Array) -> tuple[int, int, float]:
