@@ -93,19 +93,22 @@ def image_statistics(model: Model, W: Array, weights: Array, *, rigid: bool = Fa
     return frame_statistics(basis, model.normalised(W), weights, model.focal)
 
 
-def pose_statistics(basis: Array, W: Array, weights: Array, focal: float) -> Statistics:
-    """Statistics of n frames at once, where the basis is small: one product.
+def statistics_of_frames(basis: Array, W: Array, weights: Array, focal: float) -> Statistics:
+    """Statistics of n frames at once, of few points (p K²/2 numbers): one product for all, of half as many operations.
 
     Args:
         basis: as for `frame_statistics`.
-        W: (n, 2, p) the same of each frame.
+        W: (n, 2, p) the same of each frame, finite.
         weights: (n, p) the same.
         focal: the same.
     """
     n, _, p = W.shape
     K = len(basis)
     moments = np.concatenate([np.ones((n, 1, p)), W, (W**2).sum(axis=1, keepdims=True)], axis=1) * (weights / p)[:, None]
-    sums = moments.reshape(4 * n, p) @ (basis[:, None] * basis).reshape(K * K, p).T
+    i, j = np.triu_indices(K)
+    sums = np.empty((4 * n, K, K))
+    sums[:, i, j] = moments.reshape(4 * n, p) @ (basis[i] * basis[j]).T
+    sums[:, j, i] = sums[:, i, j]
     return from_sums(sums.reshape(n, 4, K, K), focal)
 
 

@@ -10,7 +10,7 @@ from reconstruction.camera import Camera, quaternion_from_rotation, rotation_fro
 from reconstruction.state import State
 from reconstruction.window.energy import Energy, pose_energy
 from reconstruction.window.solver import Solver, minimise
-from reconstruction.window.statistics import Statistics, pose_statistics
+from reconstruction.window.statistics import Statistics, statistics_of_frames
 
 POSES = Solver(iterations=10, tolerance=1e-4)
 
@@ -61,7 +61,7 @@ def pose_data(W: Array, h: Array, shape: Array, camera: Camera) -> Statistics:
     """What points (F, 2, p) relative to the principal point say about the poses of a shape (3, p), in units of its size."""
     radius = rms_radius(shape)
     basis = np.concatenate([shape / radius, np.ones((1, shape.shape[1]))])
-    return pose_statistics(basis, W / radius, h, camera.focal_px / radius)
+    return statistics_of_frames(basis, W / radius, h, camera.focal_px / radius)
 
 
 def solve_points(W: Array, h: Array, motion: RigidMotion, camera: Camera) -> Array:

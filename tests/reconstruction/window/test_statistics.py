@@ -36,6 +36,17 @@ def test_value_is_the_direct_sum_of_residuals(rng: np.random.Generator, focal: f
 
 
 @given(SEEDS, FOCAL)
+def test_many_frames_at_once_have_the_statistics_of_each(rng: np.random.Generator, focal: float) -> None:
+    basis, W, _ = scene(rng)
+    frames = np.stack([W, W + rng.normal(size=W.shape), -W])
+    h = np.stack([weights_of(rng, W.shape[1]) for _ in frames])
+    at_once = statistics.statistics_of_frames(basis, frames, h, focal)
+    each = statistics.stack([frame_statistics(basis, w, seen, focal) for w, seen in zip(frames, h, strict=True)])
+    for ours, theirs in ((at_once.gram, each.gram), (at_once.cross, each.cross), (at_once.power, each.power)):
+        np.testing.assert_allclose(ours, theirs, atol=1e-9)
+
+
+@given(SEEDS, FOCAL)
 def test_residual_is_the_reprojection_error_times_depth(rng: np.random.Generator, focal: float) -> None:
     basis, W, M = scene(rng)
     M *= 0.1 if np.isfinite(focal) else 1.0  # everything in front of the camera

@@ -21,7 +21,7 @@ from reconstruction.mapping.solid.deforming.deformations import Deformations, Le
 from reconstruction.state import POSE, State
 from reconstruction.window.normal import cholesky, from_lower, inverted
 from reconstruction.window.robust import deviation, lengths
-from reconstruction.window.statistics import frame_statistics, residuals, stack
+from reconstruction.window.statistics import residuals, statistics_of_frames
 from reconstruction.window.terms import data_normal
 
 BELIEVED = 2.0  # keyframes' worth of a Gaussian in which only the modes differ, by their eigenvalues
@@ -124,8 +124,7 @@ class Rounds:
             frames: which of all they are.
         """
         state, B, variance = known.state, known.B[:, self._some], known.deformations.noise**2 / len(self._some)
-        sums = [frame_statistics(B, one, w, self._focal) for one, w in zip(self._seen[frames], h, strict=True)]
-        normal = data_normal(stack(sums), state)
+        normal = data_normal(statistics_of_frames(B, self._seen[frames], h, self._focal), state)
         H, g = normal.diagonal / variance, normal.gradient / variance
         H[:, POSE:, POSE:] += precision
         g[:, POSE:] += state.Lambda.reshape(len(state), -1) @ precision
