@@ -107,8 +107,7 @@ def statistics_of_frames(basis: Array, W: Array, weights: Array, focal: float) -
     moments = np.concatenate([np.ones((n, 1, p)), W, (W**2).sum(axis=1, keepdims=True)], axis=1) * (weights / p)[:, None]
     i, j = np.triu_indices(K)
     sums = np.empty((4 * n, K, K))
-    sums[:, i, j] = moments.reshape(4 * n, p) @ (basis[i] * basis[j]).T
-    sums[:, j, i] = sums[:, i, j]
+    sums[:, i, j] = sums[:, j, i] = moments.reshape(4 * n, p) @ (basis[i] * basis[j]).T
     return from_sums(sums.reshape(n, 4, K, K), focal)
 
 

@@ -93,6 +93,18 @@ def located(W: Array, h: Array, bundle: Bundle, points: Mask, *, flat: bool) -> 
     return Bundle(replace(m, shape=shape), bundle.kappa)
 
 
+def with_others(W: Array, h: Array, bundle: Bundle, some: Indices, unseen: Array) -> Bundle:
+    """A bundle of `some` of the points with all of them, the others where `located` finds them.
+
+    Arguments as for that; where no view sees one, it is where a shape (3, p) has it.
+    """
+    shape, others = unseen.copy(), np.ones(unseen.shape[1], np.bool_)
+    shape[:, some] = bundle.motion.shape
+    others[some] = False
+    whole = Bundle(replace(bundle.motion, shape=shape), bundle.kappa)
+    return located(W, h, whole, others, flat=False) if others.any() else whole
+
+
 def beside_others(W: Array, seen: Mask, bundle: Bundle, points: Mask) -> Array:
     """The shape (3, p), points (p,) on the ray of the view that shows most others as well, as deep as those beside them."""
     m, others = bundle.motion, seen & ~points

@@ -13,7 +13,7 @@ from reconstruction.mapping.solid.bundle import Bundle, seen_by
 from reconstruction.mapping.solid.deforming.deformations import Learned, going_with_turn
 from reconstruction.mapping.solid.deforming.learning import POINTS, ROUNDS, learned
 from reconstruction.mapping.solid.deforming.own_motion import own_motion
-from reconstruction.mapping.solid.placing import located, well_spread
+from reconstruction.mapping.solid.placing import well_spread, with_others
 from reconstruction.settings import MOST_MODES, Settings
 from reconstruction.state import State, join
 from reconstruction.window.energy import build_energy
@@ -116,13 +116,10 @@ def among_all(attempt: Attempt, some: Indices, shown: Shown) -> Attempt:
 
     Arguments as for `gone_on`.
     """
-    rigid, others = shown.rigid, np.ones(shown.W.shape[2], np.bool_)
-    others[some] = False
-    motion, kappa = attempt.about(rigid).rest.motion, 1 / rigid.camera.focal_px
-    shape = np.zeros((3, len(others)))
-    shape[:, some] = motion.shape
+    rigid = shown.rigid
     seen = shown.W - rigid.camera.center_px[:, None], shown.sound.astype(np.float64)
-    placed = located(*seen, Bundle(replace(motion, shape=shape), kappa), others, flat=False)
+    known = Bundle(attempt.about(rigid).rest.motion, 1 / rigid.camera.focal_px)
+    placed = with_others(*seen, known, some, np.zeros_like(rigid.rest.motion.shape))
     found = replace(rigid, rest=replace(rigid.rest, motion=placed.motion))
     again = modelled(found, shown, len(attempt.model.basis.eigenvalues))
     log_s = attempt.scales(again)

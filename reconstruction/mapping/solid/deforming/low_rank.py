@@ -5,8 +5,6 @@ deformations. Images of K shapes, mixed anew in each, have rank 3K (Bregler, Her
 camera and deformation part where three columns of their motion make all rows orthogonal and equally long (Brand 2005).
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from reconstruction.arrays import Array, Mask
@@ -15,7 +13,7 @@ from reconstruction.camera import nearest_rotation
 from reconstruction.mapping.first.factorization import rotations_from_rows
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.deforming.learning import POINTS
-from reconstruction.mapping.solid.placing import located, well_spread
+from reconstruction.mapping.solid.placing import well_spread, with_others
 from reconstruction.window.robust import deviation, fit_weights, lengths
 
 SWEEPS = 20  # of filling gaps by the factors, and making these
@@ -58,12 +56,7 @@ def posed(W: Array, visible: Mask, rigid: Bundle, shapes: int, far: float) -> Ri
         raise np.linalg.LinAlgError("no shape for these keyframes")
     found = RigidMotion(s[0] * shape, R, s / s[0], t)
     found = max((found, found.mirrored()), key=lambda one: alike(one.R, m.R))
-    whole = m.shape.copy()
-    whole[:, some] = found.shape
-    others = np.ones(whole.shape[1], np.bool_)
-    others[some] = False
-    known = Bundle(replace(found, shape=whole), rigid.kappa)
-    return (located(W, visible.astype(np.float64), known, others, flat=False) if others.any() else known).motion
+    return with_others(W, visible.astype(np.float64), Bundle(found, rigid.kappa), some, m.shape).motion
 
 
 def without_gaps(W: Array, visible: Mask, first: Array, rank: int, far: float) -> Array:
