@@ -120,13 +120,12 @@ def select(W: Array, visible: Mask, camera: Camera, surface: Surface | None = No
     if sureness < PLAIN:
         rigid = both(rigid, rigid_by(views[1], views[0], camera, at))
         kind, sureness = decide(rigid, sheet, stretch, told_px, creases)
-    shape = np.full((3, W.shape[2]), np.nan)
-    shape[:, few] = rigid.shape
     turn, relief = rigid.turn_degrees, rigid.relief
-    size = rigid.size_px
-    return Evidence(
+    shape, size = rigid.shape, rigid.size_px
+    found = Evidence(
         rigid.flat, rigid.solid, turn, relief, kind, sheet, change, sureness, told_px, shape=shape, size_px=size
     )
+    return found.among(few, W.shape[2])
 
 
 def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan, creases: int = 0) -> tuple[Kind, float]:
