@@ -1,5 +1,7 @@
 """The camera of tracks that nobody knows the camera of: orthographic, or in perspective."""
 
+import numpy as np
+
 from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera, lens
 from reconstruction.mapping.keyframes import Keyframes, thinned
@@ -15,7 +17,8 @@ def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
     """The camera before which an object changes least, by keyframes; orthographic where they do not tell.
 
     What a camera in perspective sees of a sheet or solid, no orthographic one explains, and the other way round: in
-    perspective the same thing would change its lengths or its shape.
+    perspective the same thing would change its lengths or its shape. Sheets must tell the focal length, too: with creases,
+    which only a lens sees, they change less, whatever sees them.
 
     Args:
         W: (F, 2, p) px, or normalised; anything where not visible.
@@ -30,10 +33,13 @@ def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
         return Camera()
     W, visible, _ = keyframes.spread()
     parallel = map_of(W, visible, Camera(), estimate_focal=False, kind=kind)
-    near = map_of(W, visible, lens(W, USUAL_LENS), estimate_focal=True, kind=kind)
+    assumed = lens(W, USUAL_LENS)
+    near = map_of(W, visible, assumed, estimate_focal=True, kind=kind)
+    told = near is not None and not np.isclose(near.camera.focal_px, assumed.focal_px, rtol=1e-9)
     if near and not near.sheet:  # its evidence is by the focal length assumed
         near = map_of(W, visible, near.camera, estimate_focal=False, kind=kind)
-    if not (parallel and near and near.evidence and near.evidence.proven):  # unproven, a sheet always changes less
+        told = near is not None and near.evidence is not None and near.evidence.proven
+    if not (parallel and near and told):
         return Camera()
     before, after = changes(parallel, near)
     return near.camera if after < CLEARLY * before else Camera()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from reconstruction.camera import Camera
+from reconstruction.mapping import maps
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.maps import map_of
 from reconstruction.mapping.selection import Evidence
@@ -35,7 +36,7 @@ def test_of_a_solid(unit: float) -> None:
 
 
 @pytest.mark.whole
-def test_of_a_sheet() -> None:
+def test_of_a_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(5)
     W, S = waving_sheet(rng, FRAMES)
     visible = rng.random((FRAMES, W.shape[2])) > 0.2
@@ -43,6 +44,8 @@ def test_of_a_sheet() -> None:
     assert found.focal_px == pytest.approx(CAMERA.focal_px, rel=0.15)
     parallel = 200 * S[:, :2] + 0.1 * rng.normal(size=W.shape)
     assert not likely_camera(np.where(visible[:, None], parallel, np.nan), visible).perspective
+    monkeypatch.setattr(maps, "under_its_focal_length", lambda found: found)  # it tells none
+    assert not likely_camera(np.where(visible[:, None], W, np.nan), visible).perspective
 
 
 def test_what_is_not_proven_tells_no_camera(monkeypatch: pytest.MonkeyPatch) -> None:

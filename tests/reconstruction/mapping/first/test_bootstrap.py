@@ -8,7 +8,7 @@ import pytest
 from reconstruction.mapping.first.bootstrap import bootstrap
 from reconstruction.settings import Settings
 from tests.reconstruction.runs import swelling_hill
-from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, bending_sheet
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, bending_sheet, seen, spread, turns
 
 
 def test_a_solid_is_known_as_soon_as_it_has_turned() -> None:
@@ -18,6 +18,23 @@ def test_a_solid_is_known_as_soon_as_it_has_turned() -> None:
     assert found[0] is None
     assert found[1] is not None
     assert found[1].rest.kind == "rigid"
+
+
+def test_a_card_that_folds_is_no_rigid_shape() -> None:
+    """Factorisation explains it by one that turns by 70°; only who says that it is rigid gets that."""
+    rng = np.random.default_rng(0)
+    x, y = spread(rng, 100)
+    shapes = np.stack([np.stack([np.cos(a) * x, y, np.sin(a) * np.abs(x)]) for a in np.radians(np.linspace(10, 30, 15))])
+    W = seen(shapes, turns(15, 5.0), ORTHOGRAPHIC)[0] + 0.1 * rng.normal(size=(15, 2, 100))
+    visible = np.ones((15, 100), bool)
+    assert bootstrap(W, visible, ORTHOGRAPHIC, Settings(), False) is None
+    last = bootstrap(W, visible, ORTHOGRAPHIC, Settings(), True)
+    assert last is not None
+    assert last.rest.kind == "plane"
+    assert "the object may deform" in last.rest.note
+    asked = bootstrap(W, visible, ORTHOGRAPHIC, Settings(rest_shape="rigid"), False)
+    assert asked is not None
+    assert asked.rest.kind == "rigid"
 
 
 def test_without_evidence_it_is_a_sheet_and_says_why() -> None:
