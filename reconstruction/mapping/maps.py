@@ -24,7 +24,7 @@ from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES
 
 FEWEST_KEYFRAMES = 6
-LONG_LENS = 40.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
+LONG_LENS = 160.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
 
 
 def map_of(

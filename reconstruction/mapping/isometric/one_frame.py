@@ -3,7 +3,8 @@
 Depths along the rays of a smooth image keep lengths about as well in a wrong minimum as in the right one, since an image
 made smooth by itself holds noise. Shapes adjusted to points and lengths at once tell them apart. A frame's is the cheaper
 of those from the keyframe most alike and from the frame before; where its lengths change more than they usually do, other
-starts are tried.
+starts are tried. Without perspective several shapes fit an image about as well, since what slopes either way looks alike:
+the one goes on that there was.
 """
 
 from dataclasses import dataclass, replace
@@ -23,6 +24,8 @@ STARTS, STEPS = 6, 3  # keyframes that a frame in doubt starts from, and steps o
 ALIKE = 0.05  # of the depth's relief: shapes that differ by less are one
 MOST = 4  # different ones are bundled
 STEPS_USUALLY, STEPS_IN_DOUBT = 2, 8  # of bundling: after a few, a wrong shape may still cost less than the right one
+STEPS_ON = 4  # of bundling, from the frame before
+GOES_ON = 1.5  # times what the cheapest shape costs, that may cost which goes on, without perspective
 SETTLED = 0.999  # of its cost before: a shape that costs no less after a step is not bundled any more
 
 
@@ -58,13 +61,14 @@ def shape_in(sheet: IsometricSheet, W: Array, visible: Mask, last: Foreseen | No
     if last is not None:
         shapes = np.concatenate([shapes, last.shape[None]])
     C = cheapest(sheet, shapes, W, weights)
-    change = sheet.length_change(C)[0]
-    if change > DOUBTED * usual:
+    if sheet.length_change(C)[0] > DOUBTED * usual:
         C = best_of_starts(sheet, nodes, image, W, weights, C @ sheet.functions.T)
-        change = sheet.length_change(C)[0]
+    if last is not None and sheet.far:
+        on = cheapest(sheet, last.shape[None], W, weights, STEPS_ON)
+        C = on if sheet.cost(on, W, weights)[0] < GOES_ON * sheet.cost(C, W, weights)[0] else C
     return Foreseen(
         np.where(sheet.warps.placed, C[0] @ sheet.functions.T, np.nan),
-        (1 - RENEWED) * usual + RENEWED * float(change),
+        (1 - RENEWED) * usual + RENEWED * float(sheet.length_change(C)[0]),
     )
 
 
