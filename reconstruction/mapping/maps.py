@@ -13,6 +13,7 @@ from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, m
 from reconstruction.camera import Camera, lens, nearest_rotation
 from reconstruction.mapping.isometric.adjustment import FEW_ROUNDS, MOST_ROUNDS, bundled, in_halves, refined, sheet
 from reconstruction.mapping.isometric.focal import under_its_focal_length
+from reconstruction.mapping.isometric.likeliest import likeliest
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
 from reconstruction.mapping.keyframes import thinned
 from reconstruction.mapping.map import ASSUMED, Map
@@ -24,6 +25,7 @@ from reconstruction.mapping.start import Start, at_once
 from reconstruction.settings import MORE_MODES, MOST_MODES, USUAL_MODES
 
 FEWEST_KEYFRAMES = 6
+AGAIN = 2  # times shapes are chosen that are seen without perspective
 LONG_LENS = 160.0  # focal length over the object's size, RMS, of a lens that sees as an orthographic camera does
 
 
@@ -120,7 +122,10 @@ def sheet_map(
     if camera.perspective:
         found = under_its_focal_length(found) if estimate_focal else found
         camera = found.camera
-    found = bundled(found, W, MOST_ROUNDS if last else FEW_ROUNDS)
+    rounds = MOST_ROUNDS if last else FEW_ROUNDS
+    found = bundled(found, W, rounds)
+    for _ in range(AGAIN if found.far else 0):
+        found = bundled(likeliest(found), W, rounds)
     if last and camera.perspective and found.stretch > USUAL_STRETCH:
         found = bundled(refined(found, W, visible), W)
     shapes = found.shapes()
