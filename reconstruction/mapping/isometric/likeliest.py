@@ -11,9 +11,10 @@ import numpy as np
 from reconstruction.arrays import Array, Indices
 from reconstruction.mapping.isometric.bundle import MOST_GIVE
 from reconstruction.mapping.isometric.lengths import finish_depths
-from reconstruction.mapping.isometric.nodes import nearest
+from reconstruction.mapping.isometric.nodes import nearest, rays_of
 from reconstruction.mapping.isometric.shape_prior import shape_prior
 from reconstruction.mapping.isometric.sheet import IsometricSheet
+from reconstruction.mapping.isometric.starts import distinct
 
 STARTS, STEPS = 20, 8  # keyframes that each is started from, and mirrored, and steps of its depths
 AS_WELL, ENOUGH = 2.0, 0.001  # times the least change of lengths, and more, by which shapes fit as well
@@ -36,7 +37,8 @@ def likeliest(found: IsometricSheet) -> IsometricSheet:
 
     They are added one by one, always the one that looks most like one of those before, and asked again once all are there.
     """
-    fitting = [fitting_shapes(found, k) for k in range(len(found.coefficients))]
+    images = found.warps.images(found.warps.few)
+    fitting = [fitting_shapes(found, k, image) for k, image in enumerate(images)]
     C = np.stack([one.shapes[0] for one in fitting])
     few, chosen = found.functions[found.warps.few], np.zeros(len(C), np.int64)
     weight = found.edge_weights.sum() / MOST_GIVE**2
@@ -47,7 +49,7 @@ def likeliest(found: IsometricSheet) -> IsometricSheet:
         C[k] = fitting[k].shapes[chosen[k]]
         return bool(chosen[k] != before)
 
-    order = nearest_first(found.nodes.images.reshape(len(C), -1), int((C[:, 2] @ few.T).std(axis=1).argmax()))
+    order = most_alike_first(found.nodes.images.reshape(len(C), -1), int((C[:, 2] @ few.T).std(axis=1).argmax()))
     for n, k in enumerate(order[1:], 1):
         choose(k, order[:n])
     for _ in range(ROUNDS):
@@ -56,25 +58,26 @@ def likeliest(found: IsometricSheet) -> IsometricSheet:
     return replace(found, coefficients=np.stack([one.coefficients[k] for one, k in zip(fitting, chosen, strict=True)]))
 
 
-def fitting_shapes(found: IsometricSheet, k: int) -> Fitting:
-    """Shapes that fit keyframe k, the one that keeps lengths best first: started from those of its look-alikes."""
-    B, image = found.values[found.nodes.points], found.warps.images()[[k]]
+def fitting_shapes(found: IsometricSheet, k: int, image: Array) -> Fitting:
+    """Shapes that fit keyframe k, the one that keeps lengths best first: started from those of its look-alikes.
+
+    Args:
+        found: as above.
+        k: as above.
+        image: (2, m) px, where it shows the few points that tell shapes.
+    """
+    B = found.values[found.nodes.points]
     alike = found.coefficients[nearest(found.nodes.images[[k]], found.nodes.images)[0, :STARTS]]
     starts = np.concatenate([alike, mirrored(alike, B)])
     edges = found.edges.frames(np.full(len(starts), k))
     c = finish_depths(edges, found.log_lengths, starts, found.field.stiffness, found.solver.bend, STEPS)[0]
     changes = edges.rms(edges.log_lengths(c) - found.log_lengths)
-    depths = c @ B.T
-    depths -= depths.mean(axis=1, keepdims=True)
-    kept: list[int] = []
-    for j in changes.argsort():
-        if changes[j] > AS_WELL * changes.min() + ENOUGH or len(kept) == MOST:
-            break
-        off = [min(np.abs(depths[j] - sign * depths[one]).mean() for sign in (1, -1)) for one in kept]
-        if all(away > ALIKE * np.abs(depths[one]).mean() for away, one in zip(off, kept, strict=True)):
-            kept.append(int(j))
+    order = changes.argsort()
+    order = order[changes[order] <= AS_WELL * changes.min() + ENOUGH]
+    kept = order[distinct(c[order] @ B.T, ALIKE, mirrored=True)[:MOST]]
     c = np.concatenate([c[kept], mirrored(c[kept], B)])
-    shapes = found.along_rays(c, image)[:, :, found.warps.few] @ found.projector
+    depths = np.exp(c @ found.values[found.warps.few].T)
+    shapes = depths[:, None] * rays_of(image[None], found.camera) @ found.projector
     return Fitting(c, shapes, np.tile(changes[kept], 2))
 
 
@@ -85,7 +88,7 @@ def mirrored(c: Array, B: Array) -> Array:
     return other
 
 
-def nearest_first(images: Array, first: int) -> Indices:
+def most_alike_first(images: Array, first: int) -> Indices:
     """Indices of images (F, n): the first one, and always the one that is most like one of those before it."""
     order, away = [first], np.full(len(images), np.inf)
     while len(order) < len(images):

@@ -16,7 +16,7 @@ from reconstruction.mapping.isometric.images.warps import quick_fit
 from reconstruction.mapping.isometric.lengths import finish_depths
 from reconstruction.mapping.isometric.nodes import Nodes, nearest
 from reconstruction.mapping.isometric.sheet import IsometricSheet
-from reconstruction.mapping.isometric.starts import convex_finish
+from reconstruction.mapping.isometric.starts import convex_finish, distinct
 
 RENEWED = 0.3  # weight of the newest frame in the usual change of lengths
 DOUBTED = 1.3  # times the usual change of length: the frame may be in another minimum
@@ -92,12 +92,7 @@ def best_of_starts(sheet: IsometricSheet, nodes: Nodes, image: Array, W: Array, 
     c, costs = finish_depths(many, sheet.log_lengths, starts, stiffness, sheet.solver.bend, STEPS)
     ends = np.concatenate([shapes, sheet.along_rays(c[costs.argsort()], image[None])])
     depths = np.log(np.maximum(ends[:, 2, nodes.points], 1e-9))
-    depths = depths - depths.mean(axis=1, keepdims=True)
-    different = [0]
-    for k in range(1, len(ends)):
-        if all(np.abs(depths[k] - depths[one]).mean() > ALIKE * np.abs(depths[one]).mean() for one in different):
-            different.append(k)
-    return cheapest(sheet, ends[different[:MOST]], W, weights, STEPS_USUALLY if sheet.far else STEPS_IN_DOUBT)
+    return cheapest(sheet, ends[distinct(depths, ALIKE)[:MOST]], W, weights, STEPS_USUALLY if sheet.far else STEPS_IN_DOUBT)
 
 
 def cheapest(sheet: IsometricSheet, shapes: Array, W: Array, weights: Array, steps: int = STEPS_USUALLY) -> Array:

@@ -77,6 +77,22 @@ def convex_finish(nodes: Nodes, edges: Edges, like: Nodes, c: Array, B: Array, s
     return coefficients_of(np.log(depth), B[few], stiffness)
 
 
+def distinct(depths: Array, alike: float, *, mirrored: bool = False) -> list[int]:
+    """Which of depths (n, m) differ from all of these before them by more than a share of their relief, up to their means.
+
+    If `mirrored`, from their mirror images, too.
+    """
+    depths = depths - depths.mean(axis=1, keepdims=True)
+    found: list[int] = []
+    for k, one in enumerate(depths):
+        known = depths[found]
+        off = np.abs(one - known).mean(axis=1)
+        off = np.minimum(off, np.abs(one + known).mean(axis=1)) if mirrored else off
+        if (off > alike * np.abs(known).mean(axis=1)).all():
+            found.append(k)
+    return found
+
+
 def ends_of(nodes: Nodes, few: Indices, edges: Edges) -> tuple[Indices, Mask]:
     """Edges (n, 2) between a few of the nodes, and in which frames (F, n) both ends are seen."""
     good = np.zeros((len(nodes.images), nodes.reference.shape[1]), bool)

@@ -6,7 +6,7 @@ import numpy as np
 
 from reconstruction.camera import lens
 from reconstruction.mapping.isometric.adjustment import bundled, sheet
-from reconstruction.mapping.isometric.likeliest import likeliest, nearest_first
+from reconstruction.mapping.isometric.likeliest import likeliest, most_alike_first
 from reconstruction.mapping.maps import LONG_LENS
 from tests.reconstruction.mapping.bending import waving_sheet
 
@@ -30,4 +30,4 @@ def test_a_part_that_is_mirrored_is_found() -> None:
 
 def test_each_comes_after_what_it_looks_like() -> None:
     images = np.array([[0.0], [5.0], [1.0], [4.0], [2.5]])
-    assert nearest_first(images, 3).tolist() == [3, 1, 4, 2, 0]
+    assert most_alike_first(images, 3).tolist() == [3, 1, 4, 2, 0]
