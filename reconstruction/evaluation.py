@@ -40,7 +40,10 @@ class Score:
 
 
 def score(shapes: Array, rest: Array, truth: Array, frames: Indices, sigma: Array | None = None) -> Score:
-    """Compare shapes (K, 3, n), with sigma (K, n), and rest shape (3, n) with true shapes (K, 3, n) of frames (K,)."""
+    """Compare shapes (K, 3, n), with sigma (K, n), and rest shape (3, n) with true shapes (K, 3, n) of frames (K,).
+
+    Points of which the truth is not finite are not scored in that frame; three at least have to be.
+    """
     per_frame = e3d(shapes, truth)
     still = np.broadcast_to(rest, truth.shape)
     return Score(
@@ -50,7 +53,7 @@ def score(shapes: Array, rest: Array, truth: Array, frames: Indices, sigma: Arra
         e3d_sign_free=float(e3d(shapes, truth, sign_free=True).mean()),
         per_frame=per_frame,
         frames=frames,
-        points=truth.shape[2],
+        points=int(np.isfinite(truth).all(axis=1).any(axis=0).sum()),
         error_over_sigma=None if sigma is None else error_over_sigma(shapes, sigma, truth),
     )
 
@@ -60,9 +63,8 @@ def e3d(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = F
 
     `turned` grants each frame its best rotation, `sign_free` its own depth sign instead of one for all frames.
     """
-    truth = truth - truth.mean(axis=2, keepdims=True)
-    off = aligned(shapes, truth, turned=turned, sign_free=sign_free)[0] - truth
-    return np.asarray(np.linalg.norm(off, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2)))
+    placed, truth, _ = aligned(shapes, truth, turned=turned, sign_free=sign_free)
+    return np.asarray(np.linalg.norm(placed - truth, axis=(1, 2)) / np.linalg.norm(truth, axis=(1, 2)))
 
 
 def error_over_sigma(shapes: Array, sigma: Array, truth: Array) -> float:
@@ -70,17 +72,20 @@ def error_over_sigma(shapes: Array, sigma: Array, truth: Array) -> float:
 
     A frame whose shape was given has no uncertainty, and is not counted.
     """
-    truth = truth - truth.mean(axis=2, keepdims=True)
-    placed, scale = aligned(shapes, truth)
-    squares = ((placed - truth) ** 2).sum(axis=1) / scale**2
-    variances = (sigma**2).mean(axis=1)
+    placed, true, scale = aligned(shapes, truth)
+    squares = ((placed - true) ** 2).sum(axis=(1, 2)) / scale**2
+    variances = (sigma**2).sum(axis=1, where=np.isfinite(truth).all(axis=1))
     told = variances > 0
-    return float(np.median(np.sqrt(squares.mean(axis=1)[told] / variances[told])))
+    return float(np.median(np.sqrt(squares[told] / variances[told])))
 
 
-def aligned(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = False) -> tuple[Array, float]:
-    """Shapes (K, 3, n) as near to truth (K, 3, n), centred, as they can be made, see `e3d`; and their scale."""
-    shapes = shapes - shapes.mean(axis=2, keepdims=True)
+def aligned(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool = False) -> tuple[Array, Array, float]:
+    """Shapes (K, 3, n) as near to truth (K, 3, n) as they can be made, see `e3d`; the truth; and their scale.
+
+    Both are centred, and 0 where the truth is not finite.
+    """
+    known = np.asarray(np.isfinite(truth).all(axis=1))
+    shapes, truth = centred(shapes, known), centred(truth, known)
     candidates = [shapes, MIRROR @ shapes]
     if turned:
         candidates = [nearest_rotation(truth @ S.transpose(0, 2, 1)) @ S for S in candidates]
@@ -91,7 +96,14 @@ def aligned(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool
     size = np.linalg.norm(truth, axis=(1, 2))
     errors = [np.linalg.norm(scale * S - truth, axis=(1, 2)) / size for scale, S in zip(scales, candidates, strict=True)]
     best = int(np.argmin([error.mean() for error in errors]))
-    return scales[best] * candidates[best], scales[best]
+    return scales[best] * candidates[best], truth, scales[best]
+
+
+def centred(S: Array, known: Mask) -> Array:
+    """Shapes (K, 3, n) about the middle of the points known (K, n); the others are 0, so that they count for nothing."""
+    there = known[:, None]
+    middle = np.where(there, S, 0.0).sum(axis=2, keepdims=True) / there.sum(axis=2, keepdims=True)
+    return np.where(there, S - middle, 0.0)
 
 
 def followed(

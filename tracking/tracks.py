@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from tracking import Array, Flags, Indices, TrackingError
 from tracking.extent import LARGEST
 
+FEWEST_KNOWN = 3  # points of a true shape: fewer can always be turned and placed
 SKEW = 1e-3  # of the focal length: more is no ordinary camera
 
 
@@ -20,8 +21,9 @@ class Tracks:
         W: (F, 2, P) image points, px.
         visible: (F, P) bool.
         K: (3, 3) camera intrinsics, if known.
-        S_gt: (K, 3, P) true shapes in camera axes (x right, y down, z forward), if known.
+        S_gt: (K, 3, P) true shapes in camera axes (x right, y down, z forward), if known; NaN for points that are not.
         gt_frames: (K,) the frame each true shape belongs to, ascending; given together with S_gt.
+        note: what people should know of them.
 
     Raises:
         TrackingError: shapes that do not fit, or entries that are not finite.
@@ -32,6 +34,7 @@ class Tracks:
     K: Array | None = None
     S_gt: Array | None = None
     gt_frames: Indices | None = None
+    note: str = ""
 
     def __post_init__(self) -> None:
         if self.W.ndim != 3 or self.W.shape[1] != 2 or 0 in self.W.shape:
@@ -81,7 +84,7 @@ class Truth:
 
     Attributes:
         W_px: (K, 2, P) pixel positions.
-        S: (K, 3, P) true shapes in camera axes (x right, y down, z forward), any unit.
+        S: (K, 3, P) true shapes in camera axes (x right, y down, z forward), any unit; NaN for points not known.
         frames: (K,) the frame each belongs to, ascending.
         K: (3, 3) camera intrinsics, if known.
     """
@@ -113,16 +116,28 @@ def _check_intrinsics(K: Array | None) -> None:
         raise TrackingError("K is no camera matrix without skew; it must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]")
 
 
+def known_points(S: Array) -> Flags:
+    """Which points (K, P) of true shapes (K, 3, P) are known."""
+    return np.asarray(np.isfinite(S).all(axis=1))
+
+
 def _check_truth(S: Array, frames: Indices, points: int) -> None:
     if S.ndim != 3 or S.shape[1:] != (3, points) or len(S) == 0:
         raise _wrong_shape("S_gt", S, f"(true frames, 3, {points}) as there are {points} points")
-    if not np.isfinite(S).all():
-        raise TrackingError("S_gt has entries that are not finite")
-    if np.abs(S).max() > LARGEST:
+    if np.isinf(S).any():
+        raise TrackingError("S_gt has infinite entries; NaN tells that a point is not known")
+    known = known_points(S)
+    few = known.sum(axis=1) < FEWEST_KNOWN
+    if few.any():
+        raise TrackingError(f"S_gt knows fewer than {FEWEST_KNOWN} points of its shape {np.argmax(few)}: leave it out")
+    if np.nanmax(np.abs(S)) > LARGEST:
         raise TrackingError(f"S_gt has values beyond {LARGEST:g}")
     if frames.shape != (len(S),):
         raise _wrong_shape("gt_frames", frames, f"({len(S)},) as S_gt has {len(S)} shapes")
-    still = np.ptp(S, axis=2).max(axis=1) < 1 / LARGEST
+    there = known[:, None]
+    still = (S.max(axis=2, where=there, initial=-np.inf) - S.min(axis=2, where=there, initial=np.inf)).max(
+        axis=1
+    ) < 1 / LARGEST
     if still.any():
         raise TrackingError(f"S_gt has a shape without extent: that of frame {frames[still][0]}")
     if frames[0] < 0 or np.any(np.diff(frames) <= 0):

@@ -1,7 +1,7 @@
 """Arrays in a file by name: NumPy's .npz, or MATLAB's .mat."""
 
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +64,19 @@ def _read_mat(path: Path) -> Arrays:
         raise TrackingError(f"{path} has MATLAB's format 7.3, which is not read: save(..., '-v7')") from None
     except Exception as error:  # damaged files raise a dozen different things
         raise TrackingError(f"{path} is no .mat file, or damaged ({error})") from None
-    return {name: _of_cells(value) for name, value in found.items() if isinstance(value, np.ndarray)}
+    return dict(_of_structs((name, value) for name, value in found.items() if isinstance(value, np.ndarray)))
+
+
+def _of_structs(found: Iterable[tuple[str, NDArray[Any]]]) -> Iterator[tuple[str, NDArray[Any]]]:
+    """The arrays in MATLAB's structures by the names of their fields; if a list of these has one field only, by its own."""
+    for name, value in found:
+        fields = value.dtype.names or ()
+        if not fields:
+            yield name, _of_cells(value)
+        elif value.size == 1:
+            yield from _of_structs((field, np.asarray(value[field].flat[0])) for field in fields)
+        else:
+            yield from ((name if len(fields) == 1 else field, _of_cells(value[field])) for field in fields)
 
 
 def _of_cells(value: NDArray[Any]) -> NDArray[Any]:

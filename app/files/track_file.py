@@ -1,5 +1,6 @@
 """Points tracked elsewhere, and true shapes, from files of arrays."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -8,39 +9,51 @@ from app.arrays import Array, Flags, Indices
 from app.files.array_file import Arrays, read_arrays
 from tracking import TrackingError
 from tracking.extent import check_extent
-from tracking.tracks import Tracks, Truth
+from tracking.tracks import FEWEST_KNOWN, Tracks, Truth, known_points
 
-ALSO = {"S_gt": ("GT", "P3_gt", "S"), "visible": ("vis",)}  # what data sets call them
+ALSO = {  # what data sets call them; m is K⁻¹ p
+    "W": ("p2_obs", "p", "m"),
+    "S_gt": ("GT", "P3_gt", "S", "Pgth", "Pgt"),
+    "visible": ("vis", "visb"),
+    "K": ("KK",),
+}
 ROWS = {"W": 2, "W_px": 2, "S_gt": 3}  # of a frame, in matrices and arrays of any order
+ALIKE = 0.3  # of its extent: rows of a matrix that differ by less are of one coordinate
+PROJECTED = "no W: the true shapes are looked at {}"
 
 
 def load_tracks(path: Path) -> Tracks:
     """Tracks from `W` and optionally `visible` (absent: what is finite), `K`, `S_gt`, `gt_frames` (absent: all).
 
-    W may as well be (2F, P), x and y of frame after frame, (F, P, 2) or (2, P, F); S_gt likewise. Pixels become square.
+    W may as well be (2F, P), x and y of frame after frame or all x before all y, (F, P, 2) or (2, P, F); S_gt likewise.
+    Pixels become square. Without W the true shapes are projected.
 
     Raises:
-        TrackingError: the file is missing, damaged, lacks `W`, or its arrays do not fit.
+        TrackingError: the file is missing, damaged, lacks `W` and true shapes, or its arrays do not fit.
     """
     return _tracks(_named(read_arrays(path)), path)
 
 
 def _tracks(arrays: Arrays, path: Path) -> Tracks:
-    if "W" not in arrays:
+    if "W" not in arrays and ("S_gt" not in arrays or {"W_px", "gt_frames"} & {*arrays}):
         problem = f"{path} has no array W (frames, 2, points), only {_names(arrays)}"
         if "W_px" in arrays:
             raise TrackingError(f"{problem}; with W_px it is a file of truth only", "truth")
         raise TrackingError(problem)
     try:
-        W = _numbers("W", arrays)
+        K, S = (_numbers(name, arrays) if name in arrays else None for name in ("K", "S_gt"))
+        W, note = (_numbers("W", arrays), "") if S is None or "W" in arrays else _projected(S, K)
         visible = _flags("visible", arrays)
         if visible is None:
             visible = np.asarray(np.isfinite(W).all(axis=1) if W.ndim == 3 else np.zeros((0, 0), bool))
-        given = {name: _numbers(name, arrays) for name in ("K", "S_gt") if name in arrays}
+        elif W.ndim == 3 and visible.shape == (W.shape[2], len(W)):  # points by frames, unless there are as many of both
+            visible = visible if len(W) == W.shape[2] else visible.T
         gt_frames = _frame_numbers(arrays)
-        if gt_frames is None and len(given.get("S_gt", [])) == len(W):
+        if gt_frames is None and S is not None and len(S) == len(W):
             gt_frames = np.arange(len(W))
-        tracks = Tracks(W, visible, given.get("K"), given.get("S_gt"), gt_frames)
+        if S is not None and gt_frames is not None:
+            S, gt_frames = _told(S, gt_frames)
+        tracks = Tracks(W, visible, K, S, gt_frames, note)
         check_extent(tracks.W, tracks.visible)
         return tracks.with_square_pixels()
     except TrackingError as error:
@@ -67,15 +80,37 @@ def load_truth(path: Path) -> Truth:
         frames = _frame_numbers(arrays)
         assert frames is not None
         K = _numbers("K", arrays) if "K" in arrays else None
-        return Truth(_numbers("W_px", arrays), _numbers("S_gt", arrays), frames, K)
+        W_px, (S, told) = _numbers("W_px", arrays), _told(_numbers("S_gt", arrays), frames)
+        return Truth(W_px[np.isin(frames, told)] if len(W_px) == len(frames) else W_px, S, told, K)
     except TrackingError as error:
         raise TrackingError(f"{path}: {error}") from None
 
 
 def _named(arrays: Arrays) -> Arrays:
     """The same under our names."""
-    others = {name: also for name, alike in ALSO.items() if name not in arrays for also in alike if also in arrays}
-    return {**{name: arrays[also] for name, also in others.items()}, **arrays}
+    called = {name: name for name in arrays}
+    for name, others in ALSO.items():
+        for other in others:
+            if other in arrays and arrays[other].ndim > 1:
+                called.setdefault(name, other)
+    named = {name: arrays[other] for name, other in called.items()}
+    return {**named, "K": np.eye(3)} if called.get("W") == "m" else named
+
+
+def _projected(S: Array, K: Array | None) -> tuple[Array, str]:
+    """Image points (F, 2, P) of shapes (F, 3, P), seen by a camera K, or along z without perspective; and a note."""
+    if K is None:
+        return S[:, :2], PROJECTED.format("along z")
+    return (K @ S)[:, :2] / S[:, 2:], PROJECTED.format("by K")
+
+
+def _told(S: Array, frames: Indices) -> tuple[Array, Indices]:
+    """True shapes (K, 3, P) of frames (K,) but those that know too few points; none is at the origin: no camera sees it."""
+    if S.ndim != 3 or S.shape[1] != 3 or frames.shape != (len(S),):
+        return S, frames
+    S = np.where((S == 0).all(axis=1, keepdims=True), np.nan, S)
+    told = known_points(S).sum(axis=1) >= FEWEST_KNOWN
+    return (S[told], frames[told]) if told.any() else (S, frames)
 
 
 def _names(arrays: Arrays) -> str:
@@ -86,11 +121,35 @@ def _numbers(name: str, arrays: Arrays) -> Array:
     array = arrays[name]
     if array.dtype.kind not in "fiu":
         raise TrackingError(f"{name} holds {array.dtype}, but numbers are needed")
-    if (rows := ROWS.get(name)) and array.ndim == 2 and len(array) % rows == 0:
-        array = array.reshape(-1, rows, array.shape[1])
-    elif rows in array.shape and array.ndim == 3 and array.shape[1] != rows:  # coordinates last, or first
-        array = array.swapaxes(1, 2) if array.shape[2] == rows else np.moveaxis(array, 2, 0)
-    return array.astype(np.float64)
+    array, rows = array.astype(np.float64), ROWS.get(name)
+    if rows is None:
+        return array
+    if array.ndim == 2 and len(array) % rows == 0:
+        if _by_coordinate(array):
+            return array.reshape(rows, -1, array.shape[1]).swapaxes(0, 1)
+        return array.reshape(-1, rows, array.shape[1])
+    if array.ndim == 3 and array.shape[1] == 3 and rows == 2 and (array[:, 2] == 1).all():  # homogeneous
+        return array[:, :2]
+    if rows in array.shape and array.ndim == 3 and array.shape[1] != rows:  # coordinates last, or first
+        return array.swapaxes(1, 2) if array.shape[2] == rows else np.moveaxis(array, 2, 0)
+    return array
+
+
+def _by_coordinate(matrix: Array) -> bool:
+    """Whether the rows of a matrix (n, P) are one coordinate of all frames, then the next, not frame after frame.
+
+    Then rows beside each other are alike: what moves looks like it did the frame before, but x is not like y.
+    """
+    rows = np.where(matrix == 0, np.nan, matrix)  # some data sets write so what is hidden
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # rows of which nothing is known
+        apart, extent = _deviation(np.diff(rows, axis=0)), _deviation(rows)
+        return bool(np.nanmedian(apart / np.maximum(extent[1:], extent[:-1])) < ALIKE)
+
+
+def _deviation(rows: Array) -> Array:
+    """Median absolute deviation (n,) of each row (n, P) from its median, of what is not NaN."""
+    return np.asarray(np.nanmedian(np.abs(rows - np.nanmedian(rows, axis=1, keepdims=True)), axis=1))
 
 
 def _flags(name: str, arrays: Arrays) -> Flags | None:

@@ -16,7 +16,7 @@ from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model
 from reconstruction.basis.surface import Surface
 from reconstruction.estimate import ShapeEstimate
-from reconstruction.evaluation import Score, followed, score
+from reconstruction.evaluation import Score, centred, followed, score
 from tracking.tracks import Truth
 
 ROUNDING = 1e-6  # of the size
@@ -88,14 +88,19 @@ class Collected:
         return score(found[:, :3], still, S, frames, found[:, 3] if found.shape[1] > 3 else None)
 
     def true_shapes(self, truth: Truth, rest: Array, mesh: Mesh) -> dict[int, Array]:
-        """True points (n, 3) by source frame, as large as ours and in the same place; errors as of `score_against`."""
+        """True points (n, 3) by source frame, those known, as large as ours and in the same place.
+
+        Raises:
+            ReconstructionError: as of `score_against`.
+        """
         both = self._both(truth, rest, mesh)
         if both is None:
             return {}
         found, _, S, frames = both
-        middle, S = found[:, :3].mean(axis=2, keepdims=True), S - S.mean(axis=2, keepdims=True)
-        scale = np.linalg.norm(found[:, :3] - middle) / np.linalg.norm(S)
-        return {int(frame): points.T for frame, points in zip(frames, scale * S + middle, strict=True)}
+        known, found = np.asarray(np.isfinite(S).all(axis=1)), found[:, :3]
+        ours, S = centred(found, known), centred(S, known)
+        placed = np.linalg.norm(ours) / np.linalg.norm(S) * S + found - ours
+        return {int(frame): points[:, seen].T for frame, points, seen in zip(frames, placed, known, strict=True)}
 
     def _both(self, truth: Truth, rest: Array, mesh: Mesh) -> tuple[Array, Array, Array, Indices] | None:
         """Ours (K, 3, n), or 4 with sigma, that at rest (3, n), the true shapes (K, 3, n), and their frames (K,)."""

@@ -30,7 +30,7 @@ from reconstruction.evaluation import score, with_missing, with_noise, with_outl
 from reconstruction.online import Reconstruction
 from reconstruction.unknown_camera import likely_camera
 from tracking.extent import check_extent
-from tracking.tracks import Tracks
+from tracking.tracks import Tracks, known_points
 
 FEWEST_FRAMES = 2  # that a point is seen in: one has no depth
 MOST_POINTS = 100_000  # take 2 GB
@@ -86,6 +86,8 @@ def evaluate(config: Evaluate, progress: Progress) -> Evaluation:
     """
     check_outputs({"--shapes-out": config.shapes_out}, (config.tracks, config.rest_shape), overwrite=config.overwrite)
     tracks = load_tracks(config.tracks)
+    if tracks.note:
+        progress.log(tracks.note)
     frames, _, points = tracks.W.shape
     for most, of, what in ((MOST_POINTS, points, "points"), (MOST_VALUES, frames * points, "points in all frames")):
         if of > most:
@@ -205,6 +207,8 @@ def given_rest_shape(config: Evaluate, tracks: Tracks) -> tuple[RestShape | None
     if config.rest_shape == "first-truth":
         if tracks.S_gt is None:
             raise UsageError(f"{config.tracks} has no true shapes S_gt: choose another --rest-shape")
+        if not known_points(tracks.S_gt[:1]).all():
+            raise UsageError(f"the first true shape in {config.tracks} lacks points: choose another --rest-shape")
         return rest_shape.given(tracks.S_gt[0], "truth", "first true shape"), None
     return rest_of_vertices(Path(config.rest_shape), tracks.W.shape[2])
 

@@ -28,6 +28,24 @@ def test_place_scale_depth_sign_and_orientation_are_no_error(rng, scale: float, 
     np.testing.assert_allclose(e3d(turned, truth), 0, atol=1e-7)
 
 
+def test_points_whose_truth_is_not_known_are_not_scored() -> None:
+    rng = np.random.default_rng(0)
+    truth = truth_of(rng)
+    shapes = truth + 0.1 * rng.normal(size=truth.shape)
+    sigma, frames = np.full((FRAMES, POINTS), 0.1), np.arange(FRAMES)
+    wild = shapes.copy()
+    wild[:, :, 15:] += 100
+    unknown = np.where(np.arange(POINTS) >= 15, np.nan, truth)
+    some = score(shapes[:, :, :15], truth[0, :, :15], truth[:, :, :15], frames, sigma[:, :15])
+    ours = score(wild, truth[0], unknown, frames, sigma)
+    np.testing.assert_allclose(ours.per_frame, some.per_frame)
+    assert (ours.points, ours.error_over_sigma) == (15, pytest.approx(some.error_over_sigma))
+    unknown[2, 1, 3] = np.nan  # of one frame alone
+    changed = e3d(wild, unknown)
+    assert np.isfinite(changed).all()
+    assert changed[2] != pytest.approx(ours.per_frame[2], rel=1e-4)
+
+
 def test_a_wrong_pose_counts_only_for_the_camera() -> None:
     rng = np.random.default_rng(0)
     truth = truth_of(rng)

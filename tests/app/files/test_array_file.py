@@ -23,6 +23,18 @@ def cells(frames: Any) -> Any:
     return made
 
 
+def list_of_structures(field: str, frames: Any) -> Any:
+    """A MATLAB structure array (1, F) with one field."""
+    made = np.empty((1, len(frames)), [(field, object)])
+    made[0] = [(frame,) for frame in frames]
+    return made
+
+
+def homogeneous(points: Any) -> Any:
+    """(F, 3, P) with ones."""
+    return np.concatenate([points, np.ones((F, 1, P))], axis=1)
+
+
 @pytest.mark.parametrize(
     "arrays",
     [
@@ -30,8 +42,9 @@ def cells(frames: Any) -> Any:
         {"W": W.reshape(2 * F, P), "S": S.reshape(3 * F, P), "Rs": np.zeros((2 * F, 3))},
         {"W": np.moveaxis(W, 0, 2), "P3_gt": np.moveaxis(S, 0, 2), "name": "shark"},
         {"W": cells(W), "GT": cells(S), "scene": {"of": "something"}},
+        {"scene": {"p": list_of_structures("p", homogeneous(W)), "Pgth": list_of_structures("P", S)}},
     ],
-    ids=["as in NumPy", "matrices", "frames last", "cells"],
+    ids=["as in NumPy", "matrices", "frames last", "cells", "structures"],
 )
 def test_tracks_of_matlab(tmp_path: Path, arrays: dict[str, Any]) -> None:
     path = tmp_path / "tracks.mat"
@@ -67,10 +80,18 @@ def test_files_that_are_no_mat(tmp_path: Path, content: bytes, says: str) -> Non
         load_tracks(path)
 
 
+def test_normalised_points_are_seen_by_a_camera_of_focal_length_1(tmp_path: Path) -> None:
+    path = tmp_path / "tracks.mat"
+    savemat(path, {"m": list_of_structures("m", homogeneous(W / 500)), "KK": np.diag([500.0, 500, 1])})
+    read = load_tracks(path)
+    np.testing.assert_array_equal(read.W, W / 500)
+    np.testing.assert_array_equal(read.K, np.eye(3))
+
+
 def test_what_is_missing_is_named(tmp_path: Path) -> None:
     path = tmp_path / "tracks.mat"
-    savemat(path, {"P3_gt": S})
-    with pytest.raises(TrackingError, match=re.escape("has no array W (frames, 2, points), only P3_gt, S_gt")):
+    savemat(path, {"P3": S})
+    with pytest.raises(TrackingError, match=re.escape("has no array W (frames, 2, points), only P3")):
         load_tracks(path)
     with pytest.raises(TrackingError, match="no file"):
         load_tracks(tmp_path / "none.mat")

@@ -8,7 +8,7 @@ import pytest
 
 from app.files.track_file import load_tracks, load_truth
 from tracking import TrackingError
-from tracking.tracks import Tracks
+from tracking.tracks import Tracks, known_points
 
 F, P = 5, 7
 RNG = np.random.default_rng(0)
@@ -66,6 +66,50 @@ def test_coordinates_may_come_last_or_first(tmp_path: Path, axes: tuple[int, int
     np.testing.assert_array_equal(tracks.S_gt, S)
 
 
+TIMES = np.linspace(0, 1, 20)[:, None, None]
+TURNED = RNG.normal(size=(3, P)) + TIMES * RNG.normal(size=(3, P))  # (20, 3, P), each like the one before
+
+
+@pytest.mark.parametrize("hidden", [np.nan, 0.0])
+def test_matrices_may_have_all_x_before_all_y(tmp_path: Path, hidden: float) -> None:
+    shapes = 300 + 100 * TURNED
+    seen = np.where(RNG.random((20, 1, P)) < 0.3, hidden, shapes[:, :2])
+    for blocks in (True, False):
+        matrices = [A.swapaxes(0, 1) if blocks else A for A in (seen, shapes)]
+        tracks = load_tracks(write(tmp_path, W=matrices[0].reshape(-1, P), S_gt=matrices[1].reshape(-1, P)))
+        np.testing.assert_array_equal(tracks.W, seen)
+        assert tracks.S_gt is not None
+        np.testing.assert_array_equal(tracks.S_gt, shapes)
+
+
+def test_true_shapes_alone_are_projected(tmp_path: Path) -> None:
+    assert (
+        load_tracks(write(tmp_path, P3_gt=TURNED.swapaxes(0, 1).reshape(-1, P))).note
+        == "no W: the true shapes are looked at along z"
+    )
+    seen = load_tracks(write(tmp_path, S_gt=TURNED + np.array([[0.0], [0], [9]]), K=K)).W
+    np.testing.assert_allclose(seen[3, :, 1], K[:2, 2] + 500 * TURNED[3, :2, 1] / (9 + TURNED[3, 2, 1]))
+
+
+def test_points_whose_truth_is_not_known(tmp_path: Path) -> None:
+    truth = np.repeat(S[:1], F, axis=0)
+    truth[1, 2, 4] = np.nan
+    truth[2, :, 5] = 0
+    truth[3, :, : P - 2] = np.nan
+    tracks = load_tracks(write(tmp_path, W=W, S_gt=truth))
+    assert tracks.gt_frames is not None
+    assert tracks.gt_frames.tolist() == [0, 1, 2, 4]
+    assert tracks.S_gt is not None
+    known = known_points(tracks.S_gt)
+    assert np.argwhere(~known).tolist() == [[1, 4], [2, 5]]
+    assert load_truth(write(tmp_path, W_px=W, S_gt=truth, gt_frames=np.arange(F))).W_px.shape == (4, 2, P)
+
+
+def test_visibility_may_have_a_row_for_each_point(tmp_path: Path) -> None:
+    visible = RNG.random((F, P)) < 0.7
+    np.testing.assert_array_equal(load_tracks(write(tmp_path, W=W, visible=visible.T)).visible, visible)
+
+
 def test_true_shapes_of_all_frames_need_no_numbers(tmp_path: Path) -> None:
     tracks = load_tracks(write(tmp_path, W=W, S_gt=np.repeat(S[:1], F, axis=0)))
     assert tracks.gt_frames is not None
@@ -84,7 +128,7 @@ def test_true_shapes_of_all_frames_need_no_numbers(tmp_path: Path) -> None:
         ({"W": NAN_W}, "W has 5 visible entries that are not finite (first: frame 0, point 3)"),
         ({"W": W.astype(str)}, "W holds <U32, but numbers are needed"),
         ({"W": W * 1j}, "W holds complex128, but numbers are needed"),
-        ({"visible": np.ones((P, F), bool)}, "visible has the shape (7, 5), but (5, 7) as in W is needed"),
+        ({"visible": np.ones((P, F + 1), bool)}, "visible has the shape (7, 6), but (5, 7) as in W is needed"),
         ({"visible": np.full((F, P), 0.5)}, "visible holds float64, but true or false is needed"),
         ({"K": np.eye(4)}, "K has the shape (4, 4), but (3, 3) is needed"),
         ({"K": -K}, "its focal lengths K[0, 0] and K[1, 1] must be positive"),
@@ -93,7 +137,8 @@ def test_true_shapes_of_all_frames_need_no_numbers(tmp_path: Path) -> None:
         ({"gt_frames": None}, "S_gt and gt_frames belong together"),
         ({"S_gt": S[:, :, :4]}, "S_gt has the shape (2, 3, 4), but (true frames, 3, 7) as there are 7 points"),
         ({"S_gt": S[:, :2]}, "S_gt has the shape (2, 2, 7), but"),
-        ({"S_gt": S * np.inf}, "S_gt has entries that are not finite"),
+        ({"S_gt": S * np.inf}, "S_gt has infinite entries; NaN tells that a point is not known"),
+        ({"S_gt": S * np.nan}, "S_gt knows fewer than 3 points of its shape 0: leave it out"),
         ({"gt_frames": np.arange(3)}, "gt_frames has the shape (3,), but (2,) as S_gt has 2 shapes is needed"),
         ({"gt_frames": np.array([1, 5])}, "gt_frames goes to 5, but W has only the frames 0 to 4"),
         ({"gt_frames": np.array([-1, 4])}, "gt_frames must ascend from 0"),

@@ -8,6 +8,7 @@ import pytest
 from app.options.evaluate import Evaluate
 from app.options.model import Model
 from app.pipeline.evaluate import Evaluation, evaluate
+from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from reconstruction.basis.mesh import triangulate
 from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
@@ -155,6 +156,14 @@ def test_tracks_that_show_nothing_are_refused(tmp_path: Path, name: str, says: s
     np.savez(tmp_path / "tracks.npz", **hostile(name, W, np.ones((len(W), W.shape[2]), bool)))
     with pytest.raises(TrackingError, match=says):
         evaluate(Evaluate(tmp_path / "tracks.npz"), Progress())
+
+
+def test_a_first_shape_that_lacks_points_is_refused(tmp_path: Path) -> None:
+    W, S = swelling_hill()
+    S[0, 2, 7] = np.nan
+    np.savez(tmp_path / "tracks.npz", W=W, S_gt=S)
+    with pytest.raises(UsageError, match="lacks points: choose another --rest-shape"):
+        evaluate(Evaluate(tmp_path / "tracks.npz", rest_shape="first-truth"), Progress())
 
 
 def test_tracks_of_which_nearly_all_is_hidden_are_refused(tmp_path: Path) -> None:
