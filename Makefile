@@ -57,10 +57,11 @@ pictures: demo
 	$(BIN)/python -m docs.pictures
 	$(BIN)/python -m docs.moving
 
-# By the environment, since pip then pins what builds the package, too.
+# By the environment, since pip then pins what builds the package, too. What is editable it does not compile.
 .venv/ready: pyproject.toml constraints.txt
 	$(PYTHON) -m venv .venv
 	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(BIN)/python -m compileall -q app modeshape reconstruction tracking
 	touch $@
 
 # Everything but OpenCV is that of .venv.
