@@ -90,8 +90,9 @@ def rotation_from_quaternion(q: Array) -> Array:
 
 def quaternion_exp(theta: Array) -> Array:
     """Unit quaternions (..., 4) that turn by the rotation vectors `theta` (..., 3) in radians."""
-    angle = np.linalg.norm(theta, axis=-1, keepdims=True)
-    return np.concatenate([np.cos(angle / 2), 0.5 * np.sinc(angle / (2 * np.pi)) * theta], axis=-1)
+    half = 0.5 * theta
+    angle = np.sqrt((half * half).sum(axis=-1, keepdims=True))
+    return np.concatenate([np.cos(angle), np.sinc(angle / np.pi) * half], axis=-1)
 
 
 def quaternion_from_rotation(R: Array) -> Array:

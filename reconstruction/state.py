@@ -42,7 +42,7 @@ class State:
         Lambda = self.Lambda.copy()
         Lambda[:, rows, :] += step[:, POSE:].reshape(len(self), len(rows), Lambda.shape[2])
         q = quaternion_product(self.q, quaternion_exp(step[:, :3]))
-        q /= np.linalg.norm(q, axis=1, keepdims=True)
+        q /= np.sqrt((q * q).sum(axis=1, keepdims=True))
         return State(q, self.t + step[:, 3:5], self.log_s + step[:, 5], Lambda)
 
     def scaled_rotations(self) -> Array:

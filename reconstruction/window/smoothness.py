@@ -67,15 +67,18 @@ def quaternion_tangent(q: Array) -> Array:
 
 
 def add_smoothness(normal: Normal, energy: Energy, state: State, before: Previous | None) -> None:
-    """Differences of neighbours inside the window, and of the oldest frame to the one that has left it."""
+    """Differences of neighbours inside the window, and of the oldest frame to the one that has left it.
+
+    Quaternions are at right angles to their tangents, whose columns are a half long each.
+    """
     earlier, later, information = neighbours(energy, state, before)
     n, d = len(later), normal.gradient.shape[1]
     if n == 0:
         return
-    nearer = np.where((earlier.q * later.q).sum(axis=1) < 0, -1.0, 1.0)[:, None, None]
-    J_earlier, J_later = -nearer * quaternion_tangent(earlier.q), quaternion_tangent(later.q)
-    delta = quaternion_difference(earlier.q, later.q)[:, :, None]
+    nearer = np.where((earlier.q * later.q).sum(axis=1) < 0, -energy.rotation, energy.rotation)[:, None, None]
+    before_turned, turned = quaternion_tangent(earlier.q), nearer * quaternion_tangent(later.q)
     change, weights = np.zeros((n, d)), np.zeros((n, d))
+    weights[:, :3] = energy.rotation / 4
     change[:, 5], weights[:, 5] = later.log_s - earlier.log_s, energy.scale
     change[:, POSE:], _, weights[:, POSE:] = deformation_change(energy, earlier, later)
     if information is not None:
@@ -83,12 +86,12 @@ def add_smoothness(normal: Normal, energy: Energy, state: State, before: Previou
         normal.gradient[0, POSE:] += information @ change[0, POSE:]
         normal.diagonal[0, POSE:, POSE:] += information
     inner = slice(n + 1 - len(state), n)  # the others tie frames of the window to each other
-    for J, sign, frames in ((J_later, 1.0, slice(n)), (J_earlier, -1.0, inner)):
-        target = slice(len(state) - n, None) if sign > 0 else slice(len(state) - 1)
-        Jt = energy.rotation * J[frames].transpose(0, 2, 1)
-        normal.gradient[target, :3] += (Jt @ delta[frames])[:, :, 0]
-        normal.gradient[target, 5:] += sign * weights[frames, 5:] * change[frames, 5:]
-        normal.diagonal[target, :3, :3] += Jt @ J[frames]
-        diagonals(normal.diagonal[target])[:, 5:] += weights[frames, 5:]
-    normal.coupling[:, :3, :3] += energy.rotation * J_earlier[inner].transpose(0, 2, 1) @ J_later[inner]
+    pulled, along = weights * change, diagonals(normal.diagonal)
+    pulled[:, :3] = -(earlier.q[:, None] @ turned)[:, 0]
+    normal.gradient[len(state) - n :] += pulled
+    along[len(state) - n :] += weights
+    pulled[:, :3] = (later.q[:, None] @ (nearer * before_turned))[:, 0]
+    normal.gradient[:-1] -= pulled[inner]
+    along[:-1] += weights[inner]
+    normal.coupling[:, :3, :3] -= before_turned[inner].transpose(0, 2, 1) @ turned[inner]
     diagonals(normal.coupling)[:, 5:] -= weights[inner, 5:]

@@ -58,6 +58,12 @@ class Statistics:
         return form.reshape(n, 3 * K, 3 * K)
 
     @cached_property
+    def modes(self) -> Array:
+        """(n, 4, r²) the sums between modes."""
+        n, _, K, _ = self.gram.shape
+        return self.gram[:, :, 3:-1, 3:-1].reshape(n, 4, (K - 4) ** 2)
+
+    @cached_property
     def linear(self) -> Array:
         """(n, 3, K) half the linear part in M, negative."""
         return self.cross * np.array([1.0, 1.0, -1.0])[:, None]
@@ -125,11 +131,6 @@ def stack(parts: list[Statistics]) -> Statistics:
         np.concatenate([s.cross for s in parts]),
         np.concatenate([s.power for s in parts]),
     )
-
-
-def gradient(statistics: Statistics, M: Array) -> Array:
-    """Half the derivative (n, 3, K) of the data terms with respect to M (n, 3, K)."""
-    return apply(statistics, M[:, None])[:, 0] - statistics.linear
 
 
 def apply(statistics: Statistics, M: Array) -> Array:

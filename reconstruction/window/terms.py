@@ -19,6 +19,9 @@ from reconstruction.window.statistics import Statistics
 HAT = np.zeros((3, 3, 3))  # HAT[k] = [e_k]×
 for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     HAT[i, k, j], HAT[i, j, k] = 1.0, -1.0
+FORM = np.zeros((4, 3, 3))  # which rows of M each of the sums of `Statistics` is between
+FORM[0, 0, 0] = FORM[0, 1, 1] = FORM[3, 2, 2] = 1.0
+FORM[1, 0, 2] = FORM[1, 2, 0] = FORM[2, 1, 2] = FORM[2, 2, 1] = -1.0
 
 
 def evaluate(energy: Energy, data: Statistics, state: State, before: Previous | None) -> Array:
@@ -70,34 +73,30 @@ def data_normal(data: Statistics, state: State) -> Normal:
 def add_data(normal: Normal, free_rows: tuple[int, ...], data: Statistics, state: State) -> None:
     """Reprojection, quadratic in M: pose by the chain rule, Λ as a Kronecker product of AᵀA and the Υ part of the sums."""
     n, r = len(state), state.Lambda.shape[2]
-    rows = list(free_rows)
     M = state.matrices()
     A = M[:, :, :3]
-    pose = np.zeros((n, POSE, 3, 4 + r))  # dM/d(θ, t, log s)
-    X = np.concatenate([np.broadcast_to(np.eye(3), (n, 3, 3)), state.Lambda], axis=2)
-    pose[:, :3, :, :-1] = A[:, None] @ (HAT @ X[:, None])
-    pose[:, 3, 0, -1] = pose[:, 4, 1, -1] = 1.0
-    pose[:, 5, :, :-1] = M[:, :, :-1]
-    slope = statistics.gradient(data, M)
-    curved = statistics.apply(data, pose)
-    flat = pose.reshape(n, POSE, -1)
+    ways = np.zeros((n, POSE + 1, 3, 4 + r))  # dM/d(θ, t, log s), and M itself
+    ways[:, :3, :, :3] = turned = A[:, None] @ HAT
+    ways[:, :3, :, 3:-1] = turned @ state.Lambda[:, None]
+    ways[:, 3, 0, -1] = ways[:, 4, 1, -1] = 1.0
+    ways[:, 5, :, :-1] = M[:, :, :-1]
+    ways[:, 6] = M
+    curved = statistics.apply(data, ways)
+    slope, curved = curved[:, 6] - data.linear, curved[:, :6]
+    flat = ways[:, :6].reshape(n, POSE, -1)
     normal.gradient[:, :POSE] += (flat @ slope.reshape(n, -1, 1))[:, :, 0]
     normal.diagonal[:, :POSE, :POSE] += flat @ curved.reshape(n, POSE, -1).transpose(0, 2, 1)
-    if not rows or not r:
+    if not free_rows or not r:
         return
-    free = A[:, :, rows]
-    k = len(rows) * r
-    normal.gradient[:, POSE:] += (free.transpose(0, 2, 1) @ slope[:, :, 3:-1]).reshape(n, k)
-    mixed = (free.transpose(0, 2, 1)[:, None] @ curved[:, :, :, 3:-1]).reshape(n, POSE, k)
+    free = A if free_rows == ALL_ROWS else A[:, :, free_rows]
+    across, rows = free.transpose(0, 2, 1), len(free_rows)
+    normal.gradient[:, POSE:] += (across @ slope[:, :, 3:-1]).reshape(n, -1)
+    mixed = (across[:, None] @ curved[:, :, :, 3:-1]).reshape(n, POSE, -1)
     normal.diagonal[:, :POSE, POSE:] += mixed
     normal.diagonal[:, POSE:, :POSE] += mixed.transpose(0, 2, 1)
-    both = free[:, :, None, :, None] * free[:, None, :, None, :]  # (n, 3, 3, rows, rows)
-    twice = both + both.transpose(0, 2, 1, 3, 4)
-    factors = np.stack([both[:, 0, 0] + both[:, 1, 1], -twice[:, 0, 2], -twice[:, 1, 2], both[:, 2, 2]], axis=1)
-    modes = data.gram[:, :, 3:-1, 3:-1]
-    kron = (factors.reshape(n, 4, -1).transpose(0, 2, 1) @ modes.reshape(n, 4, -1)).reshape(n, len(rows), len(rows), r, r)
-    by_rows = normal.diagonal[:, POSE:, POSE:].reshape(n, len(rows), r, len(rows), r)  # a view
-    by_rows += kron.transpose(0, 1, 3, 2, 4)
+    factors = (across[:, None] @ (FORM @ free[:, None])).reshape(n, 4, -1).transpose(0, 2, 1)
+    by_rows = normal.diagonal[:, POSE:, POSE:].reshape(n, rows, r, rows, r)  # a view
+    by_rows += (factors @ data.modes).reshape(n, rows, rows, r, r).transpose(0, 1, 3, 2, 4)
 
 
 def by_row_tau(normal: Normal, slope: Array) -> Normal:

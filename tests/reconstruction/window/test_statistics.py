@@ -26,6 +26,11 @@ def weights_of(rng: np.random.Generator, p: int) -> np.ndarray:
     return np.where(mask, rng.random(p) if rng.random() < 0.5 else 1.0, 0.0)
 
 
+def gradient(data: statistics.Statistics, M: np.ndarray) -> np.ndarray:
+    """Half the derivative (n, 3, K) of the data terms with respect to M (n, 3, K)."""
+    return statistics.apply(data, M[:, None])[:, 0] - data.linear
+
+
 @given(SEEDS, FOCAL)
 def test_value_is_the_direct_sum_of_residuals(rng: np.random.Generator, focal: float) -> None:
     basis, W, M = scene(rng)
@@ -62,7 +67,7 @@ def test_far_away_cameras_are_orthographic(rng: np.random.Generator) -> None:
     h = weights_of(rng, W.shape[1])
     far, orthographic = (frame_statistics(basis, W, h, focal) for focal in (1e9, np.inf))
     assert statistics.value(far, M)[0] == pytest.approx(statistics.value(orthographic, M)[0], rel=1e-6, abs=1e-9)
-    np.testing.assert_allclose(statistics.gradient(far, M), statistics.gradient(orthographic, M), atol=1e-6)
+    np.testing.assert_allclose(gradient(far, M), gradient(orthographic, M), atol=1e-6)
     direct = (h * ((W - M[0, :2] @ basis) ** 2).sum(axis=0)).sum() / W.shape[1]  # Eq. 8
     assert statistics.value(orthographic, M)[0] == pytest.approx(direct, rel=1e-9, abs=1e-12)
 
@@ -71,7 +76,7 @@ def test_far_away_cameras_are_orthographic(rng: np.random.Generator) -> None:
 def test_gradient_is_half_the_derivative(rng: np.random.Generator, focal: float) -> None:
     basis, W, M = scene(rng, p=15, r=2)
     data = frame_statistics(basis, W, weights_of(rng, 15), focal)
-    slope = statistics.gradient(data, M)[0]
+    slope = gradient(data, M)[0]
     for c, k in np.ndindex(slope.shape):
         step = np.zeros_like(M)
         step[0, c, k] = 1e-5
