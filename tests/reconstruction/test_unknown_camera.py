@@ -64,8 +64,10 @@ def test_the_same_kind_is_compared_before_both_cameras(kind: str) -> None:
         for sheet, solid in ((0.24, 0.32), (0.23, 0.35))
     )
     if kind == "sheet":
-        near = replace(near, sheet=cast(IsometricSheet, SimpleNamespace()))
-    assert changes(parallel, near) == ((0.24, 0.23) if kind == "sheet" else (0.32, 0.35))
+        warps = SimpleNamespace(noise_px=np.array([0.1, 0.2, 0.3]))
+        near = replace(near, sheet=cast(IsometricSheet, SimpleNamespace(warps=warps)))
+    beyond_noise = np.sqrt([0.24**2 - 0.04, 0.23**2 - 0.04])
+    assert changes(parallel, near) == pytest.approx(beyond_noise if kind == "sheet" else (0.32, 0.35))
 
 
 def test_few_frames_do_not_tell() -> None:
