@@ -4,21 +4,25 @@ import numpy as np
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.camera import Camera, lens
+from reconstruction.mapping.isometric.adjustment import with_focal
+from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.keyframes import Keyframes, thinned
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.maps import map_of
+from reconstruction.mapping.maps import LONG_LENS, map_of
 from reconstruction.mapping.selection import Kind
 
 USUAL_LENS = 5.0  # focal length over the object's size, RMS: of what fills half a picture
-CLEARLY = 0.85  # times what the object changes before an orthographic camera: less is proof of perspective
+CLEARLY = 0.85  # times what the object changes before an orthographic camera: less is proof of perspective,
+FROM_FAR = 0.67  # ... if it is so much less, too, than what the same sheet changes, seen through longer and longer lenses
+LONGER = 1.4  # steps to these
 
 
 def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
     """The camera before which an object changes least, by keyframes; orthographic where they do not tell.
 
     What a camera in perspective sees of a sheet or solid, no orthographic one explains, and the other way round: in
-    perspective the same thing would change its lengths or its shape. Sheets must tell the focal length, too: with creases,
-    which only a lens sees, they change less, whatever sees them.
+    perspective the same thing would change its lengths or its shape. A sheet is also asked how much it would change seen
+    from afar: with creases, which only a lens finds, it changes less, whatever sees it.
 
     Args:
         W: (F, 2, p) px, or normalised; anything where not visible.
@@ -35,14 +39,23 @@ def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
     parallel = map_of(W, visible, Camera(), estimate_focal=False, kind=kind)
     assumed = lens(W, USUAL_LENS)
     near = map_of(W, visible, assumed, estimate_focal=True, kind=kind)
-    told = near is not None and not np.isclose(near.camera.focal_px, assumed.focal_px, rtol=1e-9)
     if near and not near.sheet:  # its evidence is by the focal length assumed
         near = map_of(W, visible, near.camera, estimate_focal=False, kind=kind)
-        told = near is not None and near.evidence is not None and near.evidence.proven
-    if not (parallel and near and told):
+    if not (parallel and near):
         return Camera()
+    proven = shows_perspective(near.sheet, W) if near.sheet else near.evidence is not None and near.evidence.proven
     before, after = changes(parallel, near)
-    return near.camera if after < CLEARLY * before else Camera()
+    return near.camera if proven and after < CLEARLY * before else Camera()
+
+
+def shows_perspective(found: IsometricSheet, W: Array) -> bool:
+    """Whether a sheet in keyframes W (F, 2, p) px changes clearly less than through a lens that sees no perspective."""
+    focal_px, longest_px = found.camera.focal_px, lens(W, LONG_LENS).focal_px
+    near = far = with_focal(found, focal_px)
+    while focal_px < longest_px:
+        focal_px = min(LONGER * focal_px, longest_px)
+        far = with_focal(far, focal_px)
+    return near.strain_rms < FROM_FAR * far.strain_rms
 
 
 def changes(parallel: Map, near: Map) -> tuple[float, float]:

@@ -7,14 +7,14 @@ from typing import cast
 import numpy as np
 import pytest
 
-from reconstruction.camera import Camera
+from reconstruction.camera import Camera, lens
 from reconstruction.mapping import maps
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.maps import map_of
 from reconstruction.mapping.selection import Evidence
 from reconstruction.mapping.solid.rivals import Misfit
-from reconstruction.unknown_camera import changes, likely_camera
-from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
+from reconstruction.unknown_camera import USUAL_LENS, changes, likely_camera, shows_perspective
+from tests.reconstruction.mapping.bending import CAMERA, folding_sheet, waving_sheet
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
 
 FRAMES, POINTS = 20, 100
@@ -44,8 +44,21 @@ def test_of_a_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found.focal_px == pytest.approx(CAMERA.focal_px, rel=0.15)
     parallel = 200 * S[:, :2] + 0.1 * rng.normal(size=W.shape)
     assert not likely_camera(np.where(visible[:, None], parallel, np.nan), visible).perspective
-    monkeypatch.setattr(maps, "under_its_focal_length", lambda found: found)  # it tells none
-    assert not likely_camera(np.where(visible[:, None], W, np.nan), visible).perspective
+    monkeypatch.setattr(maps, "under_its_focal_length", lambda found: found)  # it tells none, but that there is one
+    assert likely_camera(np.where(visible[:, None], W, np.nan), visible).perspective
+
+
+@pytest.mark.slow
+def test_creases_are_no_perspective() -> None:
+    rng = np.random.default_rng(3)
+    W, S = folding_sheet(rng)
+    size, shapes = np.sqrt(W.var(axis=2).sum(axis=1).mean()), S[:, :2] / np.sqrt(S[:, :2].var(axis=2).sum(axis=1).mean())
+    for image, perspective in ((W, True), (size * shapes + 0.1 * rng.normal(size=W.shape), False)):
+        found = map_of(image, np.ones((len(W), W.shape[2]), bool), lens(image, USUAL_LENS), estimate_focal=True)
+        assert found is not None
+        assert found.sheet is not None
+        assert len(found.sheet.field.creases) == 1
+        assert shows_perspective(found.sheet, image) == perspective
 
 
 def test_what_is_not_proven_tells_no_camera(monkeypatch: pytest.MonkeyPatch) -> None:
