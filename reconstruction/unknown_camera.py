@@ -61,9 +61,9 @@ def shows_perspective(found: IsometricSheet, W: Array) -> bool:
 def changes(parallel: Map, near: Map) -> tuple[float, float]:
     """How much an object changes before an orthographic camera, and before one in perspective.
 
-    Lengths of a sheet, if it is one before both; else what the kind found in perspective, sheet or rigid, leaves over
-    before either, px: a sheet leaves less than a solid, whatever camera sees it. It leaves the noise of its tracks before
-    both, which tells nothing of either.
+    Lengths of a sheet, if it is one before both; else what the kind found in perspective, a sheet told its lengths or a
+    solid, leaves over before either, px: a sheet leaves less than a solid, whatever camera sees it. It leaves the noise of
+    its tracks before both, which tells nothing of either.
     """
     if parallel.sheet and near.sheet:
         return parallel.sheet.strain_rms, near.sheet.strain_rms
@@ -71,8 +71,7 @@ def changes(parallel: Map, near: Map) -> tuple[float, float]:
     assert near.evidence
     if near.sheet:
         noise_px = float(np.median(near.sheet.warps.noise_px))
-        left = parallel.evidence.sheet, near.evidence.sheet
-        return beyond(left[0].edges_px, noise_px), beyond(left[1].edges_px, noise_px)
+        return beyond(parallel.evidence.told_px, noise_px), beyond(near.evidence.told_px, noise_px)
     return parallel.evidence.solid.edges_px, near.evidence.solid.edges_px
 
 

@@ -73,7 +73,7 @@ def test_the_same_kind_is_compared_before_both_cameras(kind: str) -> None:
     assert found is not None
     assert found.evidence is not None
     parallel, near = (
-        replace(found, evidence=replace(found.evidence, sheet=Misfit(sheet, np.nan), solid=Misfit(solid, solid)))
+        replace(found, evidence=replace(found.evidence, told_px=sheet, solid=Misfit(solid, solid)))
         for sheet, solid in ((0.24, 0.32), (0.23, 0.35))
     )
     if kind == "sheet":
