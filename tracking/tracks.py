@@ -126,18 +126,14 @@ def _check_truth(S: Array, frames: Indices, points: int) -> None:
         raise _wrong_shape("S_gt", S, f"(true frames, 3, {points}) as there are {points} points")
     if np.isinf(S).any():
         raise TrackingError("S_gt has infinite entries; NaN tells that a point is not known")
-    known = known_points(S)
-    few = known.sum(axis=1) < FEWEST_KNOWN
+    few = known_points(S).sum(axis=1) < FEWEST_KNOWN
     if few.any():
         raise TrackingError(f"S_gt knows fewer than {FEWEST_KNOWN} points of its shape {np.argmax(few)}: leave it out")
     if np.nanmax(np.abs(S)) > LARGEST:
         raise TrackingError(f"S_gt has values beyond {LARGEST:g}")
     if frames.shape != (len(S),):
         raise _wrong_shape("gt_frames", frames, f"({len(S)},) as S_gt has {len(S)} shapes")
-    there = known[:, None]
-    still = (S.max(axis=2, where=there, initial=-np.inf) - S.min(axis=2, where=there, initial=np.inf)).max(
-        axis=1
-    ) < 1 / LARGEST
+    still = (np.nanmax(S, axis=2) - np.nanmin(S, axis=2)).max(axis=1) < 1 / LARGEST
     if still.any():
         raise TrackingError(f"S_gt has a shape without extent: that of frame {frames[still][0]}")
     if frames[0] < 0 or np.any(np.diff(frames) <= 0):
