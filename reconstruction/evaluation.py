@@ -53,7 +53,7 @@ def score(shapes: Array, rest: Array, truth: Array, frames: Indices, sigma: Arra
         e3d_sign_free=float(e3d(shapes, truth, sign_free=True).mean()),
         per_frame=per_frame,
         frames=frames,
-        points=int(np.isfinite(truth).all(axis=1).any(axis=0).sum()),
+        points=int(known_in(truth).any(axis=0).sum()),
         error_over_sigma=None if sigma is None else error_over_sigma(shapes, sigma, truth),
     )
 
@@ -74,7 +74,7 @@ def error_over_sigma(shapes: Array, sigma: Array, truth: Array) -> float:
     """
     placed, true, scale = aligned(shapes, truth)
     squares = ((placed - true) ** 2).sum(axis=(1, 2)) / scale**2
-    variances = (sigma**2).sum(axis=1, where=np.isfinite(truth).all(axis=1))
+    variances = (sigma**2).sum(axis=1, where=known_in(truth))
     told = variances > 0
     return float(np.median(np.sqrt(squares[told] / variances[told])))
 
@@ -84,7 +84,7 @@ def aligned(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool
 
     Both are centred, and 0 where the truth is not finite.
     """
-    known = np.asarray(np.isfinite(truth).all(axis=1))
+    known = known_in(truth)
     shapes, truth = centred(shapes, known), centred(truth, known)
     candidates = [shapes, MIRROR @ shapes]
     if turned:
@@ -97,6 +97,11 @@ def aligned(shapes: Array, truth: Array, *, turned: bool = True, sign_free: bool
     errors = [np.linalg.norm(scale * S - truth, axis=(1, 2)) / size for scale, S in zip(scales, candidates, strict=True)]
     best = int(np.argmin([error.mean() for error in errors]))
     return scales[best] * candidates[best], truth, scales[best]
+
+
+def known_in(truth: Array) -> Mask:
+    """Which points (K, n) of true shapes (K, 3, n) are known."""
+    return np.asarray(np.isfinite(truth).all(axis=1))
 
 
 def centred(S: Array, known: Mask) -> Array:

@@ -36,16 +36,16 @@ def likely_camera(W: Array, visible: Mask, kind: Kind | None = None) -> Camera:
     if not keyframes.frames:
         return Camera()
     W, visible, _ = keyframes.spread()
-    parallel = map_of(W, visible, Camera(), estimate_focal=False, kind=kind)
-    assumed = lens(W, USUAL_LENS)
-    near = map_of(W, visible, assumed, estimate_focal=True, kind=kind)
+    near = map_of(W, visible, lens(W, USUAL_LENS), estimate_focal=True, kind=kind)
     if near and not near.sheet:  # its evidence is by the focal length assumed
         near = map_of(W, visible, near.camera, estimate_focal=False, kind=kind)
-    if not (parallel and near):
+    if near is None or not (shows_perspective(near.sheet, W) if near.sheet else near.evidence and near.evidence.proven):
         return Camera()
-    proven = shows_perspective(near.sheet, W) if near.sheet else near.evidence is not None and near.evidence.proven
+    parallel = map_of(W, visible, Camera(), estimate_focal=False, kind=kind)
+    if parallel is None:
+        return Camera()
     before, after = changes(parallel, near)
-    return near.camera if proven and after < CLEARLY * before else Camera()
+    return near.camera if after < CLEARLY * before else Camera()
 
 
 def shows_perspective(found: IsometricSheet, W: Array) -> bool:

@@ -46,8 +46,8 @@ def _tracks(arrays: Arrays, path: Path) -> Tracks:
         visible = _flags("visible", arrays)
         if visible is None:
             visible = np.asarray(np.isfinite(W).all(axis=1) if W.ndim == 3 else np.zeros((0, 0), bool))
-        elif W.ndim == 3 and visible.shape == (W.shape[2], len(W)):  # points by frames, unless there are as many of both
-            visible = visible if len(W) == W.shape[2] else visible.T
+        elif W.ndim == 3 and visible.shape == (W.shape[2], len(W)) != (len(W), W.shape[2]):  # points by frames
+            visible = visible.T
         gt_frames = _frame_numbers(arrays)
         if gt_frames is None and S is not None and len(S) == len(W):
             gt_frames = np.arange(len(W))

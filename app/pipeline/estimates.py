@@ -16,7 +16,7 @@ from reconstruction.basis.mesh import Mesh
 from reconstruction.basis.model import Model
 from reconstruction.basis.surface import Surface
 from reconstruction.estimate import ShapeEstimate
-from reconstruction.evaluation import Score, centred, followed, score
+from reconstruction.evaluation import Score, centred, followed, known_in, score
 from tracking.tracks import Truth
 
 ROUNDING = 1e-6  # of the size
@@ -97,7 +97,7 @@ class Collected:
         if both is None:
             return {}
         found, _, S, frames = both
-        known, found = np.asarray(np.isfinite(S).all(axis=1)), found[:, :3]
+        known, found = known_in(S), found[:, :3]
         ours, S = centred(found, known), centred(S, known)
         placed = np.linalg.norm(ours) / np.linalg.norm(S) * S + found - ours
         return {int(frame): points[:, seen].T for frame, points, seen in zip(frames, placed, known, strict=True)}
