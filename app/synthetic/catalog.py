@@ -181,6 +181,19 @@ def living(shape: Callable[[Array], Array], pull: float) -> Maker:
     return maker
 
 
+def worn(rng: np.random.Generator) -> Shape:
+    """A shirt on a chest that breathes: folds travel over it, far finer than it is."""
+    a, b = rng.uniform(0, 2 * np.pi, 2)
+
+    def shape(places: Array, time: float) -> Array:
+        waves = np.sin(2 * np.pi * (places @ (2.5, 3.0)) + 4 * np.pi * time + a)
+        return solid.chest(places, 0.015 * (1 + np.sin(3 * np.pi * time + b)) * waves) * (
+            1 + 0.02 * np.sin(5 * np.pi * time)
+        )
+
+    return shape
+
+
 def chewing(rng: np.random.Generator) -> Shape:
     """A head whose jaw, a third of it, opens and shuts: two rigid parts beside each other."""
     pace, a = rng.uniform(3, 5), rng.uniform(0, 2 * np.pi)
@@ -239,6 +252,7 @@ KINDS = {
     "talking-head": Kind("solid", living(solid.head, 0.06), SOLID_TURN),
     "chewing-head": Kind("solid", chewing, SOLID_TURN),
     "opening-box": Kind("solid", opening, SOLID_TURN),
+    "shirt": Kind("solid", worn, SOLID_TURN),
     "heart": Kind("solid", living(heart, 0.1), SHEET_TURN),
     "can": Kind("solid", still(solid.can), SOLID_TURN, held_back=True),
     "drum": Kind("solid", still(solid.drum), (120.0, 180.0)),

@@ -23,6 +23,14 @@ def can(places: Array) -> Array:
     return bent(places, ACROSS, lambda arc: 2.4 * arc)
 
 
+def chest(places: Array, out: Array) -> Array:
+    """The front of a round body, its skin so far (n,) outwards."""
+    turned = 2.0 * places[:, 0]
+    return bent(places, ACROSS, lambda arc: 2.0 * arc) + out[:, None] * np.column_stack(
+        [np.sin(turned), np.zeros(len(places)), -np.cos(turned)]
+    )
+
+
 def drum(places: Array) -> Array:
     """A round can, all around it."""
     return bent(places, ACROSS, lambda arc: 6.2 * arc)

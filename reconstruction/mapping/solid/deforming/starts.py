@@ -12,7 +12,7 @@ from reconstruction.camera import nearest_rotation
 from reconstruction.mapping.first.factorization import rotations_from_rows
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, begun, gone_on
-from reconstruction.mapping.solid.deforming.learning import RIGHTED
+from reconstruction.mapping.solid.deforming.learning import POINTS, RIGHTED
 from reconstruction.mapping.solid.deforming.low_rank import posed
 from reconstruction.mapping.solid.deforming.turning import turned_on, unsteadiness
 from reconstruction.mapping.start import Start, at_once
@@ -32,6 +32,8 @@ def likeliest(start: Attempt, shown: Shown, begin: Start = at_once) -> tuple[Att
 
     Many modes explain wrong poses by deformations. So all are compared by few modes and few points: what many have found,
     told by few, with what few find themselves. Mean shapes are the rigid one, by factorisation (`low_rank`), or shallower.
+    But few modes cannot follow small folds, and then wrong poses suit them best: many modes must find the best of them
+    likelier, too, unless they would explain anything.
     Last comes what is learned where poses do not turn back (`turning`), if it turns more steadily and is about as likely.
 
     Args:
@@ -52,8 +54,11 @@ def likeliest(start: Attempt, shown: Shown, begin: Start = at_once) -> tuple[Att
     here = each(try_one, flatter)
     finds = [one for one in (*elsewhere.result(), *here) if one]
     best = min(finds, key=lambda one: one.unlikeliness, default=told)
-    taken = best.unlikeliness < told.unlikeliness - LIKELIER
-    one, end = (best, gone_on(best, shown)) if taken else (told, usual)
+    one, end, taken = told, usual, False
+    if best.unlikeliness < told.unlikeliness - LIKELIER:
+        further = gone_on(best, shown)
+        if taken := further.unlikeliness < usual.unlikeliness or explains_anything(usual, shown):
+            one, end = best, further
     if turned := turned_on(end, shown, USUAL_MODES, FEW_POINTS):
         finds.append(turned)
         steadier = unsteadiness(turned.known.state, shown.frames) < unsteadiness(end.known.state, shown.frames)
@@ -65,6 +70,12 @@ def likeliest(start: Attempt, shown: Shown, begin: Start = at_once) -> tuple[Att
     mirrored = not camera.perspective
     otherwise = max((apart(one.known.shapes, other.known.shapes, mirrored=mirrored) for other in alike), default=0.0)
     return end, otherwise
+
+
+def explains_anything(attempt: Attempt, shown: Shown) -> bool:
+    """Whether the Λ' of a keyframe has as many unknowns as the usual image has coordinates."""
+    points = min(float(np.median(shown.visible.sum(axis=1))), POINTS)
+    return bool(3 * len(attempt.model.basis.eigenvalues) >= 2 * points)
 
 
 def each(
