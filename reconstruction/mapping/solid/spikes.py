@@ -143,10 +143,14 @@ def depth_variance(information: Array) -> Array:
 
 
 def along(information: Array, change: Array) -> Array:
-    """Steps (3, p) that change the depths by so much and the images as little as can be."""
+    """Steps (3, p) that change the depths by so much and the images as little as can be, and go aside by no more.
+
+    What is seen from the side has other neighbours than those of its place in the main plane, and would be carried off.
+    """
     xy, z = information[:, :2, :2] + 1e-9 * np.eye(2), information[:, :2, 2:]
-    beside = -np.linalg.solve(xy, z)[:, :, 0].T * change
-    return np.concatenate([beside, change[None]])
+    aside = -np.linalg.solve(xy, z)[:, :, 0].T
+    change = change / np.linalg.norm(aside, axis=0).clip(1.0)
+    return np.concatenate([aside * change, change[None]])
 
 
 def off_neighbours_plane(points: Array, edges: Indices, sound: Mask) -> tuple[sp.csr_array, Array]:

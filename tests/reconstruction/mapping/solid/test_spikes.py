@@ -69,6 +69,18 @@ def test_a_side_that_the_main_plane_shows_edge_on_has_no_spikes():
     np.testing.assert_allclose(kept.shape, shape, atol=0.8)
 
 
+def test_what_one_view_shows_from_the_side_is_not_carried_off():
+    shape = np.random.default_rng(2).normal(size=(3, 200))
+    shape *= 60 / np.linalg.norm(shape, axis=0)
+    R = np.stack([turn((0.0, degrees, 0.0)) for degrees in np.linspace(-85, 85, 18)])
+    visible = (R @ shape)[:, 2] < -8
+    assert (visible.sum(axis=0) == 1).sum() > 3
+    motion, _ = smoothed(
+        visible, Bundle(RigidMotion(shape, R, np.ones(18), np.zeros((18, 2))), 0.0), np.where(visible, 0.1, np.nan)
+    )
+    assert np.linalg.norm(motion.shape - shape, axis=0).max() < 30
+
+
 def test_what_deforms_more_than_the_rest_is_no_spike():
     rng = np.random.default_rng(4)
     shape = relief(rng, 150)
