@@ -5,14 +5,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from app.arrays import Array
-from app.synthetic import cloth, sheet, solid
+from app.synthetic import bends, cloth, solid
 from app.synthetic.path import Path
+from app.synthetic.places import Maker, Shape
 
-Shape = Callable[[Array, float], Array]  # of places (n, 2) and a time from 0 to 1: points (n, 3)
-Maker = Callable[[np.random.Generator], Shape]
 UPPER_CORNERS = 0, [0, -1]  # of a cloth's mesh
 JAW, LID = 0.12, 0.28  # where the mouth is, down from the middle of a head; where a box's lid is hung
 HELD_SEEDS = 100  # seeds from this one on are held back
@@ -39,42 +37,6 @@ class Kind:
     def path(self, rng: np.random.Generator) -> Path:
         """A path for one of them, from so near that perspective shows."""
         return Path(float(rng.uniform(*self.turn_deg)), self.late, 2.2, rng.uniform(0, 2 * np.pi, 6))
-
-
-def waving(slope_rad: float) -> Maker:
-    """Sheets with waves of such a slope that run through them, across lines that slowly turn; never flat."""
-
-    def maker(rng: np.random.Generator) -> Shape:
-        along, length = rng.uniform(0, np.pi), rng.uniform(0.9, 1.2)
-        a, b, c = rng.uniform(0, 2 * np.pi, 3)
-
-        def shape(places: Array, time: float) -> Array:
-            t = 2 * np.pi * time
-            return sheet.bent(
-                places,
-                along + 0.4 * np.sin(t + a),
-                lambda arc: slope_rad * (0.8 + 0.2 * np.sin(2 * t + b)) * np.sin(2 * np.pi * arc / length + 2 * t + c),
-            )
-
-        return shape
-
-    return maker
-
-
-def swaying(rng: np.random.Generator) -> Shape:
-    """A curtain, turned a little away, with folds that the draught moves, less near the rod; it stretches by up to 3 %."""
-    side, (a, b, c) = rng.uniform(0.3, 0.5) * rng.choice([-1, 1]), rng.uniform(0, 2 * np.pi, 3)
-    turned = Rotation.from_rotvec([0.0, side, 0.0]).as_matrix()
-
-    def shape(places: Array, time: float) -> Array:
-        t = 4 * np.pi * time
-        drawn = places * (1.0, 1.0 + 0.03 * np.sin(1.5 * t + c))
-        level = flat(drawn)
-        folds = sheet.bent(drawn, 0.2, lambda arc: 0.12 * np.sin(2 * np.pi * arc / 0.9 + t + a) + 0.1 * np.sin(1.3 * t + b))
-        below = 0.6 + 1.1 * places[:, 1:]
-        return np.asarray((level + below * (folds - level)) @ turned.T)
-
-    return shape
 
 
 def flapping(rng: np.random.Generator) -> Shape:
@@ -106,62 +68,10 @@ def drawn_together(corners: cloth.Places) -> Maker:
     return maker
 
 
-def rolling(rng: np.random.Generator) -> Shape:
-    """Paper that is rolled up to most of a half cylinder and back; never flat."""
-    along, a = rng.uniform(0, np.pi), rng.uniform(0, 2 * np.pi)
-    return lambda places, time: sheet.bent(
-        places, along + 0.2 * np.sin(2 * np.pi * time), lambda arc: (1.2 + 0.9 * np.sin(2 * np.pi * time + a)) * arc
-    )
-
-
-def coning(rng: np.random.Generator) -> Shape:
-    """Paper that is rolled up like an ice-cream cone's, around a point that wanders off its edge."""
-    side, a = rng.uniform(0, 2 * np.pi), rng.uniform(0, 2 * np.pi)
-
-    def shape(places: Array, time: float) -> Array:
-        t = 2 * np.pi * time
-        at = side + 0.3 * np.sin(t)
-        bend = 0.8 + 0.3 * np.sin(2 * t + a)
-        return sheet.coned(places, 1.0 * np.array([np.cos(at), np.sin(at)]), bend)
-
-    return shape
-
-
-def creasing(rng: np.random.Generator) -> Shape:
-    """A card with a crease that opens and closes."""
-    along, a = rng.uniform(0, np.pi), rng.uniform(0, 2 * np.pi)
-    return lambda places, time: sheet.folded(places, along, 0.9 + 0.6 * np.sin(4 * np.pi * time + a))
-
-
-def leafing(rng: np.random.Generator) -> Shape:
-    """A book that opens and shuts, its back off the middle, its pages bent each in its own way."""
-    along, back, (a, b, c) = rng.uniform(0, np.pi), rng.uniform(-0.12, 0.12), rng.uniform(0, 2 * np.pi, 3)
-    return lambda places, time: sheet.opened(
-        places, along, back, 0.7 + 0.45 * np.sin(4 * np.pi * time + a), 0.6 * np.sin(5.2 * np.pi * time + np.array([b, c]))
-    )
-
-
 def swelling(rng: np.random.Generator) -> Shape:
     """A balloon that is blown up and let out."""
     a = rng.uniform(0, 2 * np.pi)
     return lambda places, time: solid.balloon(places, 0.55 - 0.4 * np.cos(3 * np.pi * time + a))
-
-
-def drawn_out(rng: np.random.Generator) -> Shape:
-    """Rubber that is drawn out by up to 40 % and let go, a third of that narrower meanwhile, a little bent."""
-    along, a = rng.uniform(0, np.pi), rng.uniform(0, 2 * np.pi)
-
-    def shape(places: Array, time: float) -> Array:
-        longer = 0.2 * (1 + np.sin(4 * np.pi * time + a))
-        return sheet.bent(places * (0.8 * (1 + longer), 1 - longer / 3), along, lambda arc: 0.8 * np.sin(2 * arc))
-
-    return shape
-
-
-def tearing(rng: np.random.Generator) -> Shape:
-    """Paper that is torn from its upper edge down, one half bent to the front, the other to the back."""
-    begun, bend = rng.uniform(-0.3, -0.2), rng.uniform(1.0, 2.0)
-    return lambda places, time: sheet.torn(places, begun + 0.45 * time, bend)
 
 
 def living(shape: Callable[[Array], Array], pull: float) -> Maker:
@@ -219,11 +129,6 @@ def still(shape: Callable[[Array], Array]) -> Maker:
     return lambda _: lambda places, _time: shape(places)
 
 
-def flat(places: Array) -> Array:
-    """A card."""
-    return np.column_stack([places, np.zeros(len(places))])
-
-
 def heart(places: Array) -> Array:
     """A dome."""
     return solid.balloon(places, 0.8)
@@ -231,20 +136,21 @@ def heart(places: Array) -> Array:
 
 SHEET_TURN, SOLID_TURN = (10.0, 25.0), (25.0, 40.0)
 KINDS = {
-    "waving-3": Kind("sheet", waving(0.3), SHEET_TURN),
-    "waving-5": Kind("sheet", waving(0.5), SHEET_TURN),
-    "waving-7": Kind("sheet", waving(0.7), SHEET_TURN),
-    "waving-9": Kind("sheet", waving(0.9), SHEET_TURN),
-    "rolling": Kind("sheet", rolling, SHEET_TURN),
-    "curtain": Kind("sheet", swaying, (0.5, 1.0)),
+    "waving-3": Kind("sheet", bends.waving(0.3), SHEET_TURN),
+    "waving-5": Kind("sheet", bends.waving(0.5), SHEET_TURN),
+    "waving-7": Kind("sheet", bends.waving(0.7), SHEET_TURN),
+    "waving-9": Kind("sheet", bends.waving(0.9), SHEET_TURN),
+    "rolling": Kind("sheet", bends.rolling, SHEET_TURN),
+    "curtain": Kind("sheet", bends.swaying, (0.5, 1.0)),
     "cloth": Kind("sheet", shaken, SHEET_TURN),
     "flag": Kind("sheet", flapping, SHEET_TURN),
     "towel": Kind("sheet", drawn_together(UPPER_CORNERS), SHEET_TURN),
     "blanket": Kind("sheet", drawn_together(np.ix_([0, -1], [0, -1])), SHEET_TURN),
-    "book": Kind("sheet", leafing, SHEET_TURN),
-    "cone": Kind("sheet", coning, SHEET_TURN, held_back=True),
-    "crease": Kind("sheet", creasing, SHEET_TURN, held_back=True),
-    "card": Kind("flat", still(flat), SOLID_TURN),
+    "book": Kind("sheet", bends.leafing, SHEET_TURN),
+    "page": Kind("sheet", bends.lifted, SHEET_TURN),
+    "cone": Kind("sheet", bends.coning, SHEET_TURN, held_back=True),
+    "crease": Kind("sheet", bends.creasing, SHEET_TURN, held_back=True),
+    "card": Kind("flat", still(bends.flat), SOLID_TURN),
     "box": Kind("solid", still(solid.box), SOLID_TURN),
     "box-late": Kind("solid", still(solid.box), SOLID_TURN, late=0.5),
     "head": Kind("solid", still(solid.head), SOLID_TURN),
@@ -257,6 +163,6 @@ KINDS = {
     "can": Kind("solid", still(solid.can), SOLID_TURN, held_back=True),
     "drum": Kind("solid", still(solid.drum), (120.0, 180.0)),
     "balloon": Kind("", swelling, SOLID_TURN),
-    "rubber": Kind("", drawn_out, SOLID_TURN, held_back=True),
-    "tear": Kind("", tearing, SOLID_TURN, held_back=True),
+    "rubber": Kind("", bends.drawn_out, SOLID_TURN, held_back=True),
+    "tear": Kind("", bends.tearing, SOLID_TURN, held_back=True),
 }

@@ -1,8 +1,13 @@
-"""Places on the rectangle that things are made from: x, y, in its width."""
+"""Places on the rectangle that things are made from: x, y, in its width; and what makes things of them."""
+
+from collections.abc import Callable
 
 import numpy as np
 
 from app.arrays import Array
+
+Shape = Callable[[Array, float], Array]  # of places (n, 2) and a time from 0 to 1: points (n, 3)
+Maker = Callable[[np.random.Generator], Shape]
 
 ASPECT = 0.75  # its height over its width
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.arrays import Array
-from app.synthetic.catalog import HELD_SEEDS, KINDS, Kind, Shape
+from app.synthetic.catalog import HELD_SEEDS, KINDS, Kind
 from app.synthetic.path import Path
-from app.synthetic.places import grid
+from app.synthetic.places import Shape, grid
 
 FRAMES = 120
 

@@ -19,7 +19,7 @@ from reconstruction.mapping.isometric.flat_parts import folded
 from reconstruction.mapping.isometric.images.creases import creases_in
 from reconstruction.mapping.isometric.images.smooth_field import smooth_field
 from reconstruction.mapping.isometric.images.warps import Warps, creased, finer, smooth_warps
-from reconstruction.mapping.isometric.lengths import adjust_depths, finish_depths
+from reconstruction.mapping.isometric.lengths import Edges, adjust_depths, best_start, finish_depths, robust_lengths
 from reconstruction.mapping.isometric.nodes import edges_between, nodes_of, on_edges, rays_of
 from reconstruction.mapping.isometric.sheet import IsometricSheet, described
 from reconstruction.mapping.isometric.starts import FROM_PLANES, SOLVER, again, coefficients_of, first_depths, once_more
@@ -62,9 +62,22 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
     smooth = on_smooth_images(warps, camera)
     if smooth.strain_beyond_noise <= CREASED or smooth.far:
         return smooth
+    if other := mirrored(smooth):
+        return other
     folds = [folded_sheet(creased(warps, W, visible, creases), camera) for creases in creases_in(warps, W)]
     best = min((found for found in folds if found), key=lambda found: found.change, default=smooth)
     return best if best.change < LESS * smooth.change else smooth
+
+
+def mirrored(found: IsometricSheet) -> IsometricSheet | None:
+    """The sheet begun at its mirror image, if that keeps its lengths: what bends to one side alone may end on the other."""
+    seen = edges_between(found.nodes, found.on_edges, found.camera)
+    logs = robust_lengths(seen, seen.log_lengths(-found.coefficients))[0]
+    c = best_start(seen, logs, [-found.coefficients], found.field.stiffness, found.solver.bend)
+    with suppress(ReconstructionError):
+        other = kept_long(found, seen, c)
+        return other if other.strain_beyond_noise < KEPT and other.change < LESS * found.change else None
+    return None
 
 
 def folded_sheet(warps: Warps, camera: Camera) -> IsometricSheet | None:
@@ -90,11 +103,21 @@ def on_smooth_images(warps: Warps, camera: Camera) -> IsometricSheet:
         c, solver = coefficients_of(folded(warps, camera)[:, nodes.points], B, field.stiffness), FROM_PLANES
     else:
         c, solver = first_depths(nodes, seen, B, field.stiffness, camera), SOLVER
-    factor, change = np.ones(len(nodes.ends)), np.inf
+    return kept_long(described(warps, nodes, field, values, c, np.ones(len(nodes.ends)), camera, solver), seen, c)
+
+
+def kept_long(found: IsometricSheet, seen: Edges, c: Array) -> IsometricSheet:
+    """A sheet adjusted from coefficients c (F, r), stuck frames begun anew, while that keeps its edges' lengths better.
+
+    Raises:
+        ReconstructionError: no depths keep the lengths.
+    """
+    B, stiffness, solver, camera = found.values[found.nodes.points], found.field.stiffness, found.solver, found.camera
+    factor, change = np.ones(len(found.nodes.ends)), np.inf
     for _ in range(ROUNDS):
-        c, factor = again(nodes, seen, seen.weighted(factor), c, B, field.stiffness, camera, solver)
-        before, found = change, described(warps, nodes, field, values, c, factor, camera, solver)
-        change = found.strain_rms
+        c, factor = again(found.nodes, seen, seen.weighted(factor), c, B, stiffness, camera, solver)
+        found = described(found.warps, found.nodes, found.field, found.values, c, factor, camera, solver)
+        before, change = change, found.strain_rms
         if change > (1 - LITTLE_GAIN) * before:
             break
     if found.strain_beyond_noise > MOST_CHANGE or change > MOST_AT_ALL:

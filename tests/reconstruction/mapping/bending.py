@@ -40,6 +40,18 @@ def waving_sheet(
     return CAMERA.project(S) + noise_px * rng.standard_normal((frames, 2, points)), S
 
 
+def lifted_page(rng: np.random.Generator, frames: int = 16, points: int = 200) -> tuple[np.ndarray, np.ndarray]:
+    """The same of a sheet that is held flat at one side and lifted at the other."""
+    uv, grid = np.stack([rng.uniform(-0.6, 0.6, points), rng.uniform(-0.45, 0.45, points)]), np.linspace(-0.8, 0.8, 800)
+    direction, turn, shapes = rng.uniform(-0.4, 0.4), rng.uniform(0, 2 * np.pi, 2), []
+    for time in np.arange(frames) / frames:
+        slope = -1.3 * np.sin(np.pi * time) ** 2 * np.clip((grid + 0.3) / 0.42, 0, 1)
+        R = turned(0.2 * np.sin(4 * time + turn[0]), 0.2 * np.sin(4 * time + turn[1]))
+        shapes.append(R @ bent(uv, direction, slope, grid) + np.array([0.0, 0.0, 2.6])[:, None])
+    S = np.array(shapes)
+    return CAMERA.project(S) + 0.2 * rng.standard_normal((frames, 2, points)), S
+
+
 def stretching_sheet(
     rng: np.random.Generator, stretch: float, frames: int = 10, points: int = 120
 ) -> tuple[np.ndarray, np.ndarray]:
