@@ -75,7 +75,7 @@ def mirrored(found: IsometricSheet) -> IsometricSheet | None:
     logs = robust_lengths(seen, seen.log_lengths(-found.coefficients))[0]
     c = best_start(seen, logs, [-found.coefficients], found.field.stiffness, found.solver.bend)
     with suppress(ReconstructionError):
-        other = kept_long(found, seen, c)
+        other = kept_long(replace(found, coefficients=c), seen)
         return other if other.strain_beyond_noise < KEPT and other.change < LESS * found.change else None
     return None
 
@@ -103,17 +103,17 @@ def on_smooth_images(warps: Warps, camera: Camera) -> IsometricSheet:
         c, solver = coefficients_of(folded(warps, camera)[:, nodes.points], B, field.stiffness), FROM_PLANES
     else:
         c, solver = first_depths(nodes, seen, B, field.stiffness, camera), SOLVER
-    return kept_long(described(warps, nodes, field, values, c, np.ones(len(nodes.ends)), camera, solver), seen, c)
+    return kept_long(described(warps, nodes, field, values, c, np.ones(len(nodes.ends)), camera, solver), seen)
 
 
-def kept_long(found: IsometricSheet, seen: Edges, c: Array) -> IsometricSheet:
-    """A sheet adjusted from coefficients c (F, r), stuck frames begun anew, while that keeps its edges' lengths better.
+def kept_long(found: IsometricSheet, seen: Edges) -> IsometricSheet:
+    """A sheet adjusted from its depths on, stuck frames begun anew, while its edges, as they are seen, keep lengths better.
 
     Raises:
         ReconstructionError: no depths keep the lengths.
     """
     B, stiffness, solver, camera = found.values[found.nodes.points], found.field.stiffness, found.solver, found.camera
-    factor, change = np.ones(len(found.nodes.ends)), np.inf
+    c, factor, change = found.coefficients, np.ones(len(found.nodes.ends)), np.inf
     for _ in range(ROUNDS):
         c, factor = again(found.nodes, seen, seen.weighted(factor), c, B, stiffness, camera, solver)
         found = described(found.warps, found.nodes, found.field, found.values, c, factor, camera, solver)

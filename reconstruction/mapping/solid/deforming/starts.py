@@ -54,17 +54,17 @@ def likeliest(start: Attempt, shown: Shown, begin: Start = at_once) -> tuple[Att
     here = each(try_one, flatter)
     finds = [one for one in (*elsewhere.result(), *here) if one]
     best = min(finds, key=lambda one: one.unlikeliness, default=told)
-    one, end, taken = told, usual, False
+    one, end = told, usual
     if best.unlikeliness < told.unlikeliness - LIKELIER:
         further = gone_on(best, shown)
-        if taken := further.unlikeliness < usual.unlikeliness or explains_anything(usual, shown):
+        if further.unlikeliness < usual.unlikeliness or explains_anything(usual, shown):
             one, end = best, further
     if turned := turned_on(end, shown, USUAL_MODES, FEW_POINTS):
         finds.append(turned)
         steadier = unsteadiness(turned.known.state, shown.frames) < unsteadiness(end.known.state, shown.frames)
         if steadier and turned.unlikeliness < one.unlikeliness + LIKELIER:
-            one, end, taken = turned, gone_on(turned, shown), True
-    if not taken and finds:
+            one, end = turned, gone_on(turned, shown)
+    if end is usual and finds:
         one = finds[0]  # of few modes by themselves: those of many differ from all of theirs
     alike = [other for other in finds if other.unlikeliness < one.unlikeliness + ALIKE]
     mirrored = not camera.perspective
