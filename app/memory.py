@@ -6,7 +6,7 @@ from functools import cache
 from threading import Thread
 from time import sleep
 
-KEPT_BYTES = {-1: 16 * 2**20, -3: 32 * 2**20}  # by parameter of glibc's mallopt: M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
+KEPT_BYTES = {-1: 32 * 2**20, -3: 32 * 2**20}  # by parameter of glibc's mallopt: M_TRIM_THRESHOLD, M_MMAP_THRESHOLD
 TRIMMED_S = 10.0  # between two times at which all that is kept goes back: what was needed once must not stay for ever
 
 

@@ -9,6 +9,7 @@ so a frame's data term is quadratic in M with five small matrices. f → ∞ is 
 Lengths are in units of the rest shape's RMS radius and Υ' = √p Υ, so nothing depends on image size, p or r.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -100,7 +101,7 @@ def image_statistics(model: Model, W: Array, weights: Array, *, rigid: bool = Fa
 
 
 def statistics_of_frames(basis: Array, W: Array, weights: Array, focal: float) -> Statistics:
-    """Statistics of n frames at once, of few points (p K²/2 numbers): one product for all, of half as many operations.
+    """Statistics of n frames at once, of few points (p K²/2 numbers).
 
     Args:
         basis: as for `frame_statistics`.
@@ -108,13 +109,37 @@ def statistics_of_frames(basis: Array, W: Array, weights: Array, focal: float) -
         weights: (n, p) the same.
         focal: the same.
     """
-    n, _, p = W.shape
-    K = len(basis)
-    moments = np.concatenate([np.ones((n, 1, p)), W, (W**2).sum(axis=1, keepdims=True)], axis=1) * (weights / p)[:, None]
-    i, j = np.triu_indices(K)
-    sums = np.empty((4 * n, K, K))
-    sums[:, i, j] = sums[:, j, i] = moments.reshape(4 * n, p) @ (basis[i] * basis[j]).T
-    return from_sums(sums.reshape(n, 4, K, K), focal)
+    return next(Products(basis).statistics(W, weights, focal, len(W)))
+
+
+class Products:
+    """Products of a basis's rows, two at a time: one product of matrices sums up all frames, in half as many operations.
+
+    Args:
+        basis: B (K, p) with the row of ones last.
+    """
+
+    def __init__(self, basis: Array) -> None:
+        K = len(basis)
+        self._one, self._other = np.triu_indices(K)
+        self._products = basis[self._one] * basis[self._other]
+        self._place = np.zeros((K, K), np.intp)  # of the sums between two rows
+        self._place[self._one, self._other] = self._place[self._other, self._one] = np.arange(len(self._one))
+
+    def change_rest(self, basis: Array) -> None:
+        """Go over to a basis with another rest shape, but the same modes."""
+        first = 3 * len(basis) - 3  # are of the first three rows
+        np.multiply(basis[self._one[:first]], basis[self._other[:first]], out=self._products[:first])
+
+    def statistics(self, W: Array, weights: Array, focal: float, at_once: int) -> Iterator[Statistics]:
+        """Statistics of n frames, so many at once; arguments as for `statistics_of_frames`."""
+        n, _, p = W.shape
+        moments = (
+            np.concatenate([np.ones((n, 1, p)), W, (W**2).sum(axis=1, keepdims=True)], axis=1) * (weights / p)[:, None]
+        )
+        sums = (moments.reshape(4 * n, p) @ self._products.T).reshape(n, 4, -1)
+        for start in range(0, n, at_once):
+            yield from_sums(sums[start : start + at_once].take(self._place, axis=2), focal)
 
 
 def from_sums(sums: Array, focal: float) -> Statistics:

@@ -46,9 +46,14 @@ def test_many_frames_at_once_have_the_statistics_of_each(rng: np.random.Generato
     frames = np.stack([W, W + rng.normal(size=W.shape), -W])
     h = np.stack([weights_of(rng, W.shape[1]) for _ in frames])
     at_once = statistics.statistics_of_frames(basis, frames, h, focal)
+    products = statistics.Products(np.concatenate([rng.normal(size=(3, W.shape[1])), basis[3:]]))
+    products.change_rest(basis)
+    in_parts = statistics.stack(list(products.statistics(frames, h, focal, 2)))
     each = statistics.stack([frame_statistics(basis, w, seen, focal) for w, seen in zip(frames, h, strict=True)])
-    for ours, theirs in ((at_once.gram, each.gram), (at_once.cross, each.cross), (at_once.power, each.power)):
-        np.testing.assert_allclose(ours, theirs, atol=1e-9)
+    for ours in (at_once, in_parts):
+        np.testing.assert_allclose(ours.gram, each.gram, atol=1e-9)
+        np.testing.assert_allclose(ours.cross, each.cross, atol=1e-9)
+        np.testing.assert_allclose(ours.power, each.power, atol=1e-9)
 
 
 @given(SEEDS, FOCAL)

@@ -6,7 +6,8 @@ moments that they have, and the rest shape, free in every point, is what suits a
 Every two rounds tell where they lead to (`acceleration`).
 """
 
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg.lapack import dpotri, dpotrs
@@ -21,13 +22,14 @@ from reconstruction.mapping.solid.deforming.deformations import Deformations, Le
 from reconstruction.state import POSE, State
 from reconstruction.window.normal import cholesky, from_lower, inverted
 from reconstruction.window.robust import deviation, lengths
-from reconstruction.window.statistics import residuals, statistics_of_frames
+from reconstruction.window.statistics import Products, residuals
 from reconstruction.window.terms import data_normal
 
 BELIEVED = 2.0  # keyframes' worth of a Gaussian in which only the modes differ, by their eigenvalues
 KEPT = 0.7  # of the points' weights: where rounds lead to, a fifth may be off for a while, and comes back
 SCALE = 0.02  # deviation of log s from where it was at first: what comes nearer may as well swell
 LEAST_NOISE = 7.5e-3  # of the size: neighbours' errors are alike, and what is believed of them goes into depth
+NUMBERS = 2**16  # of Hessians at once: they stay in the cache
 LOOSE = 1e-3  # pull of a point of the rest shape to where it was, of what images say about it
 
 
@@ -43,6 +45,7 @@ class Rounds:
     """
 
     def __init__(self, model: Model, some: Indices, seen: Array, visible: Mask, log_s: Array) -> None:
+        self._products = Products(model.B[:, some])
         self._some, self._seen, self._visible, self._focal, self._log_s = some, seen, visible, model.focal, log_s
         alike = np.tile(model.basis.eigenvalues**0.5, 3)
         self._believed = np.diag(alike / alike.sum())
@@ -62,9 +65,8 @@ class Rounds:
         B[:3, self._some] += shifts(self._seen, off, h, state, self._focal)
         known = replace(known, B=B, deformations=replace(known.deformations, noise=noise))
         precision = inverted(known.deformations.covariance)
-        H, g = self._normal(known, precision, h, every)
-        state, unsure, taken = expected(H, g, state, precision)
-        return self._maximised(B, state, unsure, noise, taken)
+        found = expected(self._normals(known, precision, h, every), state, precision)
+        return self._maximised(B, found.state, found.unsure, noise, found.held)
 
     def further(self, before: Learned, once: Learned, twice: Learned) -> Learned:
         """Where two rounds lead to, unless that loses what images show."""
@@ -81,8 +83,8 @@ class Rounds:
         """Pose and Λ' of some frames, alone in `known`, after so many steps; minus their log likelihoods (n,)."""
         precision = inverted(known.deformations.covariance)
         for _ in range(steps):
-            H, g = self._normal(known, precision, self._left_over(known, frames)[2], frames)
-            step = np.stack([-dpotrs(cholesky(one), right, lower=1)[0] for one, right in zip(H, g, strict=True)])
+            normals = self._normals(known, precision, self._left_over(known, frames)[2], frames)
+            step = np.stack([-dpotrs(cholesky(H), g, lower=1)[0] for H, g in normals])
             known = replace(known, state=known.state.moved(step, ALL_ROWS))
         state, noise = known.state, known.deformations.noise
         Lambda = state.Lambda.reshape(len(state), -1)
@@ -92,20 +94,17 @@ class Rounds:
 
     def judged(self, known: Learned) -> Learned:
         """The same with how likely it is, and what images leave open."""
-        every, covariance = slice(None), known.deformations.covariance
-        precision = inverted(covariance)
-        H, g = self._normal(known, precision, self._left_over(known, every)[2], every)
-        told = replace(known.deformations, left_open=left_open(known.B, expected(H, g, known.state, precision)[1]))
-        return replace(known, deformations=told, unlikeliness=self._unlikeliness(known, H))
+        every, precision = slice(None), inverted(known.deformations.covariance)
+        h = self._left_over(known, every)[2]
+        there = expected(self._normals(known, precision, h, every), known.state, precision)
+        told = replace(known.deformations, left_open=left_open(known.B, there.unsure))
+        return replace(known, deformations=told, unlikeliness=self._unlikeliness(known, there.log_volume))
 
-    def _unlikeliness(self, known: Learned, H: Array) -> float:
-        """Minus the log likelihood of the images, whatever Λ' is, over how many points they show (Laplace's way).
-
-        By the Hessians (K, d, d) there.
-        """
+    def _unlikeliness(self, known: Learned, log_volume: float) -> float:
+        """Minus the log likelihood of the images, whatever Λ' is, over how many points they show (Laplace's way)."""
         covariance, noise = known.deformations.covariance, known.deformations.noise
         at_best = self.settled(known, slice(None), 0)[1].sum()
-        volumes = np.linalg.slogdet(H)[1].sum() + len(H) * np.linalg.slogdet(covariance)[1]
+        volumes = log_volume + len(known.state) * np.linalg.slogdet(covariance)[1]
         return float((at_best + volumes / 2) / self._visible.sum() + 2 * np.log(noise))
 
     def _left_over(self, known: Learned, frames: slice) -> tuple[Array, Array, Array]:
@@ -114,8 +113,8 @@ class Rounds:
         squares = (off**2).sum(axis=1)
         return off, squares, self._visible[frames] * robust(known.deformations.noise).weight(squares)
 
-    def _normal(self, known: Learned, precision: Array, h: Array, frames: slice) -> tuple[Array, Array]:
-        """Hessians (n, d, d) and gradients (n, d) of half the energy of the frames that `known` has.
+    def _normals(self, known: Learned, precision: Array, h: Array, frames: slice) -> Iterator[tuple[Array, Array]]:
+        """Hessian (d, d) and gradient (d,) of half the energy of each of the frames that `known` has.
 
         Args:
             known: the Gaussian, and where frames are.
@@ -123,14 +122,20 @@ class Rounds:
             h: (n, p) weights.
             frames: which of all they are.
         """
-        state, B, variance = known.state, known.B[:, self._some], known.deformations.noise**2 / len(self._some)
-        normal = data_normal(statistics_of_frames(B, self._seen[frames], h, self._focal), state)
-        H, g = normal.diagonal / variance, normal.gradient / variance
-        H[:, POSE:, POSE:] += precision
-        g[:, POSE:] += state.Lambda.reshape(len(state), -1) @ precision
-        H[:, POSE - 1, POSE - 1] += SCALE**-2
-        g[:, POSE - 1] += (state.log_s - self._log_s[frames]) / SCALE**2
-        return H, g
+        state, at_once = known.state, max(1, NUMBERS // (POSE + len(precision)) ** 2)
+        self._products.change_rest(known.B[:, self._some])
+        weights = h * (len(self._some) / known.deformations.noise**2)
+        pulled = state.Lambda.reshape(len(state), -1) @ precision
+        narrowed = (state.log_s - self._log_s[frames]) / SCALE**2
+        for k, data in enumerate(self._products.statistics(self._seen[frames], weights, self._focal, at_once)):
+            part = slice(k * at_once, (k + 1) * at_once)
+            normal = data_normal(data, state[part])
+            H, g = normal.diagonal, normal.gradient
+            H[:, POSE:, POSE:] += precision
+            g[:, POSE:] += pulled[part]
+            H[:, POSE - 1, POSE - 1] += SCALE**-2
+            g[:, POSE - 1] += narrowed[part]
+            yield from zip(H, g, strict=True)
 
     def _maximised(self, B: Array, state: State, unsure: Array, noise: float, taken: float) -> Learned:
         """The Gaussian of frames whose Λ' has the mean covariance `unsure`, about the mean of their shapes."""
@@ -148,23 +153,35 @@ def robust(noise: float) -> Loss:
     return Loss(TAIL_SIGMAS * noise, redescending=True)
 
 
-def expected(H: Array, g: Array, state: State, precision: Array) -> tuple[State, Array, float]:
-    """Pose and Λ' after a step; mean covariance (3r, 3r) of Λ', and mean number of parameters that the images hold.
+@dataclass(frozen=True)
+class Expected:
+    """What is to be expected of n frames.
 
-    Args:
-        H: (n, d, d) Hessians.
-        g: (n, d) gradients.
-        state: where the n frames are.
-        precision: (3r, 3r) of Λ'.
+    Attributes:
+        state: pose and Λ' after a step.
+        unsure: (3r, 3r) mean covariance of Λ'.
+        held: mean number of parameters that the images hold.
+        log_volume: sum of the logarithms of the Hessians' determinants.
     """
-    total, step = np.zeros(H.shape[1:]), np.zeros_like(g)
-    for k, one in enumerate(H):
-        factor = cholesky(one)
-        step[k] = -dpotrs(factor, g[k], lower=1)[0]
-        total += dpotri(factor, lower=1)[0]
+
+    state: State
+    unsure: Array
+    held: float
+    log_volume: float
+
+
+def expected(normals: Iterable[tuple[Array, Array]], state: State, precision: Array) -> Expected:
+    """By Hessian (d, d) and gradient (d,) of each frame, where they are, and the precision (3r, 3r) of Λ'."""
+    d = POSE + len(precision)
+    total, steps, log_volume = np.zeros((d, d), order="F"), list[Array](), 0.0
+    for H, g in normals:
+        factor = cholesky(H)
+        steps.append(-dpotrs(factor, g, lower=1)[0])
+        log_volume += 2 * np.log(factor.diagonal()).sum()
+        total += dpotri(factor, lower=1, overwrite_c=1)[0]
     inverse = from_lower(total) / len(state)
-    held = (inverse[POSE:, POSE:] * precision).sum() + inverse[POSE - 1, POSE - 1] / SCALE**2  # by what is known beforehand
-    return state.moved(step, ALL_ROWS), inverse[POSE:, POSE:], H.shape[1] - float(held)
+    known = (inverse[POSE:, POSE:] * precision).sum() + inverse[POSE - 1, POSE - 1] / SCALE**2  # beforehand
+    return Expected(state.moved(np.stack(steps), ALL_ROWS), inverse[POSE:, POSE:], d - float(known), log_volume)
 
 
 def left_open(B: Array, unsure: Array) -> float:
