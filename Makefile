@@ -6,7 +6,7 @@ BIN := .venv/bin
 OPENCV4 := 4.14.0.94
 BIN4 := .venv-opencv4/bin
 
-.PHONY: demo bench test test-gate test-all test-opencv4 lint types wheel pictures clean
+.PHONY: demo bench test test-all test-opencv4 lint types wheel pictures clean
 
 demo: .venv/ready
 	$(BIN)/modeshape demo
@@ -19,16 +19,12 @@ bench: .venv/ready
 # Two at a time, file by file, each on one core: threads of linear algebra would only wait for each other. In the order of
 # their names, in which slow files are not left to the end, when one of the two has nothing more to do.
 PYTEST := -m pytest -n 2 --dist loadfile --no-loadscope-reorder
-test test-gate test-all test-opencv4: export OPENBLAS_NUM_THREADS := 1
+test test-all test-opencv4: export OPENBLAS_NUM_THREADS := 1
 
 test: .venv/ready
 	$(BIN)/python $(PYTEST)
 
-# With what is slow and rarely fails.
-test-gate: .venv/ready
-	$(BIN)/python $(PYTEST) -m 'not whole'
-
-# With all that there is.
+# With what is slow and rarely fails: before a release, and after changes of what is reconstructed.
 test-all: .venv/ready
 	$(BIN)/python $(PYTEST) -m ''
 

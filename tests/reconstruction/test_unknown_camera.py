@@ -27,7 +27,7 @@ def solid_seen(camera: Camera) -> np.ndarray:
     return W + 0.1 * rng.normal(size=W.shape)
 
 
-@pytest.mark.parametrize("unit", [1.0, pytest.param(1e-3, marks=pytest.mark.whole)])
+@pytest.mark.parametrize("unit", [1.0, pytest.param(1e-3, marks=pytest.mark.slow)])
 def test_of_a_solid(unit: float) -> None:
     everything = np.ones((FRAMES, POINTS), bool)
     assert not likely_camera(unit * solid_seen(ORTHOGRAPHIC), everything).perspective
@@ -35,7 +35,7 @@ def test_of_a_solid(unit: float) -> None:
     assert found.focal_px == pytest.approx(unit * PERSPECTIVE.focal_px, rel=0.1)
 
 
-@pytest.mark.whole
+@pytest.mark.slow
 def test_of_a_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(5)
     W, S = waving_sheet(rng, FRAMES)
@@ -48,7 +48,6 @@ def test_of_a_sheet(monkeypatch: pytest.MonkeyPatch) -> None:
     assert likely_camera(np.where(visible[:, None], W, np.nan), visible).perspective
 
 
-@pytest.mark.slow
 def test_creases_are_no_perspective() -> None:
     rng = np.random.default_rng(3)
     W, S = folding_sheet(rng)

@@ -47,8 +47,8 @@ def clean(made: Sample, tmp_path_factory: pytest.TempPathFactory) -> Result:
 @pytest.mark.parametrize(
     "changes",
     [
-        pytest.param((flickering(0.4), blurred(8)), id="light and blur", marks=pytest.mark.whole),
-        pytest.param((noisy(10), compressed(30)), id="noise and jpeg", marks=pytest.mark.whole),
+        pytest.param((flickering(0.4), blurred(8)), id="light and blur", marks=pytest.mark.slow),
+        pytest.param((noisy(10), compressed(30)), id="noise and jpeg", marks=pytest.mark.slow),
     ],
 )
 def test_bad_pictures_cost_little(made: Sample, tmp_path: Path, changes: tuple[Change, ...]) -> None:
@@ -58,7 +58,7 @@ def test_bad_pictures_cost_little(made: Sample, tmp_path: Path, changes: tuple[C
     assert result.e3d.mean() <= 0.016
 
 
-@pytest.mark.whole
+@pytest.mark.slow
 def test_half_of_the_frames_is_enough(made: Sample, clean: Result, tmp_path: Path) -> None:
     video, truth = thinned(made.video, made.truth, tmp_path, 0.5)
     result = run(video, truth, made.roi, tmp_path)

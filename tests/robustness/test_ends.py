@@ -55,7 +55,7 @@ def begun(process: "subprocess.Popen[str]", recording: Path) -> None:
         time.sleep(0.02)
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.whole) for seed in (1, 2))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
 def test_a_killed_run_can_be_reviewed(endless: Path, tmp_path: Path, seed: int) -> None:
     process = start(endless, tmp_path)
     begun(process, tmp_path / "run.rrd")

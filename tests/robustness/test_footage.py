@@ -22,12 +22,12 @@ def outcome(clip: Clip, name: str, folder: Path) -> Result:
 @pytest.mark.parametrize(
     ("name", "losses"),
     [
-        pytest.param("light in rolling bands", 0, marks=pytest.mark.whole),
-        pytest.param("background moving, region loose", 0, marks=pytest.mark.whole),
+        pytest.param("light in rolling bands", 0, marks=pytest.mark.slow),
+        pytest.param("background moving, region loose", 0, marks=pytest.mark.slow),
         ("background moving, region found", 0),
-        pytest.param("a title card first", 0, marks=pytest.mark.whole),
-        pytest.param("leaves the picture, all", 2, marks=pytest.mark.whole),
-        pytest.param("watermark over 30 %", 0, marks=pytest.mark.whole),
+        pytest.param("a title card first", 0, marks=pytest.mark.slow),
+        pytest.param("leaves the picture, all", 2, marks=pytest.mark.slow),
+        pytest.param("watermark over 30 %", 0, marks=pytest.mark.slow),
     ],
 )
 def test_the_sample_holds(tmp_path: Path, name: str, losses: int) -> None:
@@ -37,7 +37,7 @@ def test_the_sample_holds(tmp_path: Path, name: str, losses: int) -> None:
     assert int(str(result.words["losses"])) <= losses
 
 
-@pytest.mark.whole
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_the_printed_sheet_holds(shared_data: Path, tmp_path: Path, name: str) -> None:
     clip = Clip(shared_data / "kinect_paper.mp4", shared_data / "kinect_paper_gt.npz", KINECT_ROI, 113)

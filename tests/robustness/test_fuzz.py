@@ -17,7 +17,7 @@ def samples(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("cases", [FEW, pytest.param(MORE, marks=pytest.mark.whole)], ids=["few", "more"])
+@pytest.mark.parametrize("cases", [FEW, pytest.param(MORE, marks=pytest.mark.slow)], ids=["few", "more"])
 def test_damaged_inputs(samples: Path, cases: range) -> None:
     wrong = fuzz(samples, ALL, cases)
     assert not wrong, json.dumps(wrong, indent=1)

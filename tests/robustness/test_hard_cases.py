@@ -13,8 +13,6 @@ from app.synthetic.tracks import SEVERE, Damage, damaged, tracks
 from app.terminal.progress import Progress
 from tracking.tracks import Tracks
 
-pytestmark = pytest.mark.slow
-
 
 def evaluated(given: Tracks, folder: Path) -> Evaluation:
     path = folder / "tracks.npz"
@@ -23,10 +21,8 @@ def evaluated(given: Tracks, folder: Path) -> Evaluation:
     return evaluate(Evaluate(path), Progress())
 
 
-@pytest.mark.parametrize(
-    ("kind", "found", "bound"),
-    [("head", "rigid", 0.005), pytest.param("rolling", "isometric", 0.008, marks=pytest.mark.whole)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "found", "bound"), [("head", "rigid", 0.005), ("rolling", "isometric", 0.008)])
 def test_made_up_things_with_gaps_noise_and_gross_errors(tmp_path: Path, kind: str, found: str, bound: float) -> None:
     outcome = evaluated(tracks(scene(kind, 1), SEVERE), tmp_path)
     assert outcome.rest_shape == found
@@ -34,10 +30,10 @@ def test_made_up_things_with_gaps_noise_and_gross_errors(tmp_path: Path, kind: s
     assert outcome.score.e3d <= bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "bound"),
-    [("rolling", 0.006), pytest.param("cone", 0.0045, marks=pytest.mark.whole)],  # in turns with their lengths 1.2, 1.0 %
-)
+    ("kind", "bound"), [("rolling", 0.006), ("cone", 0.0045)]
+)  # in turns with their lengths 1.2, 1.0 %
 def test_sheets_bent_much_the_same_way_all_along(tmp_path: Path, kind: str, bound: float) -> None:
     outcome = evaluated(tracks(scene(kind, 1)), tmp_path)
     assert outcome.score is not None
@@ -47,8 +43,8 @@ def test_sheets_bent_much_the_same_way_all_along(tmp_path: Path, kind: str, boun
 @pytest.mark.parametrize(
     ("kind", "points", "damage", "bound"),
     [
-        pytest.param("waving-3", 80, Damage(0.4, 0.3, 0.05), 0.02, marks=pytest.mark.whole),
-        pytest.param("rolling", 80, Damage(0.4, 0.3, 0.05), 0.016, marks=pytest.mark.whole),
+        pytest.param("waving-3", 80, Damage(0.4, 0.3, 0.05), 0.02, marks=pytest.mark.slow),
+        pytest.param("rolling", 80, Damage(0.4, 0.3, 0.05), 0.016, marks=pytest.mark.slow),
         ("cone", 30, Damage(0.2, 0.3), 0.02),  # some frames show fewer than 20 points
     ],
 )
@@ -59,7 +55,7 @@ def test_sheets_of_few_points_with_gaps(tmp_path: Path, kind: str, points: int, 
     assert outcome.score.e3d <= bound
 
 
-@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.whole)])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_waving_sheet_with_gaps_noise_and_gross_errors(shared_data: Path, tmp_path: Path, seed: int) -> None:
     outcome = evaluated(damaged(load_tracks(shared_data / "waving_5.npz"), SEVERE, np.random.default_rng(seed)), tmp_path)
     assert outcome.rest_shape == "isometric"

@@ -26,7 +26,7 @@ def clean(made: Sample, tmp_path_factory: pytest.TempPathFactory) -> Result:
     return run(made.video, made.truth, made.roi, tmp_path_factory.mktemp("clean"))
 
 
-@pytest.mark.whole
+@pytest.mark.slow
 @pytest.mark.parametrize(("where", "most"), [("disc", 0.041), ("side", 0.119)])  # as found, and a tenth
 def test_an_occluder_costs_little(made: Sample, clean: Result, tmp_path: Path, where: str, most: float) -> None:
     # Over one side, the hidden part has a free end and bends out of sight: what it does is not to be known.

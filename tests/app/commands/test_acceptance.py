@@ -28,7 +28,7 @@ KINECT = ("--roi", 195, 95, 325, 265, "--frames", "0:113")
         (FACE, 0.0245, 0.064),
         ((*FACE, "--missing", 0.4, "--seed", 0), 0.0288, 0.065),
         (FLAG_PERSPECTIVE, 0.022, 0.065),
-        pytest.param((*FLAG_PERSPECTIVE, "--missing", 0.4, "--seed", 0), 0.025, 0.065, marks=pytest.mark.whole),
+        pytest.param((*FLAG_PERSPECTIVE, "--missing", 0.4, "--seed", 0), 0.025, 0.065, marks=pytest.mark.slow),
     ],
     ids=[
         "flag",
@@ -59,10 +59,10 @@ def test_evaluate(modeshape: Command, shared_data: Path, arguments: tuple[object
     [
         ("flag250.npz", 0.064),
         ("flag250_perspective.npz", 0.0155),
-        pytest.param("waving_3.npz", 0.0043, marks=pytest.mark.whole),
-        pytest.param("waving_5.npz", 0.006, marks=pytest.mark.whole),
-        pytest.param("waving_7.npz", 0.0055, marks=pytest.mark.whole),
-        pytest.param("waving_9.npz", 0.007, marks=pytest.mark.whole),
+        pytest.param("waving_3.npz", 0.0043, marks=pytest.mark.slow),
+        pytest.param("waving_5.npz", 0.006, marks=pytest.mark.slow),
+        pytest.param("waving_7.npz", 0.0055, marks=pytest.mark.slow),
+        pytest.param("waving_9.npz", 0.007, marks=pytest.mark.slow),
     ],
 )
 def test_sheets_that_are_never_flat(modeshape: Command, shared_data: Path, file: str, bound: float) -> None:
@@ -128,7 +128,7 @@ def test_more_modes_explain_more(modeshape: Command, shared_data: Path) -> None:
 
 @pytest.mark.parametrize(
     ("focal", "bound"),
-    [pytest.param((), 0.0178, id="found"), pytest.param(("--focal", 528), 0.0178, id="true", marks=pytest.mark.whole)],
+    [pytest.param((), 0.0178, id="found"), pytest.param(("--focal", 528), 0.0178, id="true", marks=pytest.mark.slow)],
 )
 def test_a_printed_sheet_is_followed(
     modeshape: Command, shared_data: Path, here: Path, focal: tuple[object, ...], bound: float

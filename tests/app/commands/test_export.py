@@ -154,7 +154,7 @@ def test_the_command_line(modeshape: Command, tmp_path: Path, run: Run) -> None:
     ("video", "roi"),
     [
         pytest.param("kinect_paper.mp4", (195, 95, 325, 265), id="paper", marks=pytest.mark.slow),
-        pytest.param("talking_face.mp4", (115, 70, 130, 160), id="face", marks=pytest.mark.whole),
+        pytest.param("talking_face.mp4", (115, 70, 130, 160), id="face", marks=pytest.mark.slow),
         pytest.param(None, None, id="demo"),
     ],
 )

@@ -54,7 +54,7 @@ def test_what_has_no_data_is_skipped(here: Path, modeshape: Command) -> None:
     assert readme.read_text().startswith("# Title")
 
 
-@pytest.mark.whole
+@pytest.mark.slow
 def test_real_data_give_the_first_table(shared_data: Path, tmp_path: Path) -> None:
     reproduced = reproduce(Reproduce(shared_data, tmp_path / "out", only=("accuracy",), quick=True), Progress())
     [table, published] = reproduced.experiments["accuracy"]["tables"]
@@ -65,7 +65,7 @@ def test_real_data_give_the_first_table(shared_data: Path, tmp_path: Path) -> No
         assert line["e3d %"] <= line["camera"] + 1e-9
 
 
-@pytest.mark.whole
+@pytest.mark.slow
 def test_real_data_give_every_table(shared_data: Path, tmp_path: Path) -> None:
     asked = Reproduce(shared_data, tmp_path / "out", only=("mode-counts", "metrics", "missing"), quick=True)
     experiments = reproduce(asked, Progress()).experiments
@@ -75,7 +75,7 @@ def test_real_data_give_every_table(shared_data: Path, tmp_path: Path) -> None:
     assert [len(row) for row in experiments["mode-counts"]["tables"][0]["rows"]] == [5] * 8
 
 
-@pytest.mark.whole
+@pytest.mark.slow
 def test_hard_cases_are_taken_for_what_they_are(tmp_path: Path) -> None:
     reproduced = reproduce(Reproduce(tmp_path, tmp_path / "out", only=("hard-cases",), quick=True), Progress())
     [table] = reproduced.experiments["hard-cases"]["tables"]
@@ -95,7 +95,7 @@ def test_real_data_stand_beside_peers(shared_data: Path, tmp_path: Path) -> None
     assert (tmp_path / "out" / "footage" / "modes-flag250.jpg").stat().st_size > 10_000
 
 
-@pytest.mark.whole
+@pytest.mark.slow
 def test_a_video_becomes_a_strip_and_a_chart(shared_data: Path, tmp_path: Path) -> None:
     reproduced = reproduce(Reproduce(shared_data, tmp_path / "out", only=("paper",), quick=True), Progress())
     experiments = reproduced.experiments

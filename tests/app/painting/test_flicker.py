@@ -61,7 +61,7 @@ def test_the_sample_does_not_flicker_nor_does_the_hand(tmp_path: Path) -> None:
     assert max(shares) <= MOST  # measured: 0.0008
 
 
-@pytest.mark.whole
+@pytest.mark.slow
 def test_a_sheet_of_paper_painted_to_its_edge_does_not_flicker(tmp_path: Path, shared_data: Path) -> None:
     video = shared_data / "kinect_paper.mp4"
     shares = changes(Run(str(video), corners=CORNERS, frames=":113", output=Output(out=tmp_path / "paper.rrd")))

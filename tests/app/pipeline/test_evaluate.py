@@ -16,7 +16,7 @@ from tests.reconstruction.runs import swelling_hill
 from tracking import TrackingError
 
 MILLI, KILO = 1e-3, 1e3
-SLOW, WHOLE = pytest.mark.slow, pytest.mark.whole
+SLOW = pytest.mark.slow
 UNITS = ((MILLI, 1.0), (KILO, 1.0), (1.0, MILLI), (1.0, KILO), (MILLI, MILLI), (KILO, MILLI))  # of shapes, of images
 
 
@@ -53,18 +53,18 @@ def write_mesh(path: Path, shape: np.ndarray[tuple[int, ...], np.dtype[np.float6
     ("file", "rest", "units"),
     [
         ("flag250", "first-truth", ((MILLI, 1.0), (1.0, KILO))),
-        pytest.param("flag250_perspective", "mesh", ((KILO, MILLI),), marks=WHOLE),
-        pytest.param("flag250_perspective", "mesh", ((MILLI, 1.0),), marks=WHOLE),
+        pytest.param("flag250_perspective", "mesh", ((KILO, MILLI),), marks=SLOW),
+        pytest.param("flag250_perspective", "mesh", ((MILLI, 1.0),), marks=SLOW),
         ("face37", "rigid", ((1.0, MILLI),)),
-        pytest.param("flag250", "first-truth", UNITS, marks=WHOLE),
-        pytest.param("flag250_perspective", "first-truth", UNITS, marks=WHOLE),
+        pytest.param("flag250", "first-truth", UNITS, marks=SLOW),
+        pytest.param("flag250_perspective", "first-truth", UNITS, marks=SLOW),
         pytest.param("face37", "first-truth", ((KILO, MILLI),), marks=SLOW),
-        pytest.param("face37", "rigid", UNITS, marks=WHOLE),
-        pytest.param("face37", "auto", ((KILO, MILLI),), marks=WHOLE),
-        pytest.param("flag250", "auto", ((KILO, MILLI),), marks=WHOLE),
+        pytest.param("face37", "rigid", UNITS, marks=SLOW),
+        pytest.param("face37", "auto", ((KILO, MILLI),), marks=SLOW),
+        pytest.param("flag250", "auto", ((KILO, MILLI),), marks=SLOW),
         # A regular grid has ties, which rounding decides (2e-6 in the error): powers of two have none.
-        pytest.param("flag250_perspective", "auto", ((1.0, 2.0**-10),), marks=WHOLE),
-        pytest.param("flag250_perspective", "auto", ((1.0, 2.0**10),), marks=WHOLE),
+        pytest.param("flag250_perspective", "auto", ((1.0, 2.0**-10),), marks=SLOW),
+        pytest.param("flag250_perspective", "auto", ((1.0, 2.0**10),), marks=SLOW),
         # Facing an orthographic camera a sheet is on a saddle, where rounding decides: powers of two have none.
         pytest.param("flag250", "plane", ((1.0, 2.0**-10), (1.0, 2.0**10)), marks=SLOW),
     ],
@@ -82,7 +82,7 @@ def test_units_do_not_matter(
         assert other.rest_shape == usual.rest_shape
 
 
-@pytest.mark.whole
+@pytest.mark.slow
 def test_a_rest_shape_gives_the_shapes_its_units(shared_data: Path, tmp_path: Path) -> None:
     shapes = []
     for unit in (1.0, MILLI):
@@ -96,10 +96,10 @@ def test_a_rest_shape_gives_the_shapes_its_units(shared_data: Path, tmp_path: Pa
 @pytest.mark.parametrize(
     ("file", "rest"),
     [
-        pytest.param("flag250_perspective", "first-truth", marks=WHOLE),
-        pytest.param("flag250", "auto", marks=WHOLE),
-        pytest.param("flag250_perspective", "auto", marks=WHOLE),
-        pytest.param("face37", "auto", marks=WHOLE),
+        pytest.param("flag250_perspective", "first-truth", marks=SLOW),
+        pytest.param("flag250", "auto", marks=SLOW),
+        pytest.param("flag250_perspective", "auto", marks=SLOW),
+        pytest.param("face37", "auto", marks=SLOW),
         ("waving_3", "auto"),
     ],
 )
@@ -111,7 +111,7 @@ def test_errors_are_as_large_as_predicted(shared_data: Path, file: str, rest: st
     assert 0.5 < score.error_over_sigma < 2
 
 
-@WHOLE
+@SLOW
 def test_tracks_without_a_camera_say_which(tmp_path: Path) -> None:
     path = tmp_path / "tracks.npz"
     W, S = waving_sheet(np.random.default_rng(5), 60)
@@ -173,9 +173,9 @@ def test_tracks_of_which_nearly_all_is_hidden_are_refused(tmp_path: Path) -> Non
         evaluate(Evaluate(tmp_path / "tracks.npz", missing=0.99), Progress())
 
 
-@pytest.mark.parametrize("unseen", [slice(5, 6), pytest.param(slice(0, 15), marks=WHOLE)])
+@pytest.mark.parametrize("unseen", [slice(5, 6), pytest.param(slice(0, 15), marks=SLOW)])
 def test_frames_that_show_nothing_do_not_stop_a_run(tmp_path: Path, unseen: slice) -> None:
-    W, _ = swelling_hill()
+    W = swelling_hill()[0][:40]
     visible = np.ones((len(W), W.shape[2]), bool)
     visible[unseen] = False
     visible[:, 3] = False  # a point that is never seen is left out

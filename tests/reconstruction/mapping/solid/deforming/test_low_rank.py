@@ -131,13 +131,13 @@ def test_a_shape_half_as_deep_that_turns_twice_as_far_looks_alike() -> None:
 
 
 def test_what_shrinks_while_it_turns_hardly_may_be_of_another_depth() -> None:
-    rng = np.random.default_rng(1)
-    shape = rng.normal(size=(3, P))
+    rng, points = np.random.default_rng(1), 48
+    shape = rng.normal(size=(3, points))
     shape *= 60 / np.linalg.norm(shape, axis=0)
     shape[2] = -np.abs(shape[2])  # the near side of a ball
-    shrinking = 1 - 0.8 * np.linspace(0, 1, K)[:, None, None] * (np.arange(P) % 2)
+    shrinking = 1 - 0.8 * np.linspace(0, 1, K)[:, None, None] * (np.arange(points) % 2)
     W, _ = seen(shape * shrinking, turns(K, 8.0), ORTHOGRAPHIC)
-    W, visible = W + 0.2 * rng.normal(size=W.shape), np.ones((K, P), bool)
+    W, visible = W + 0.2 * rng.normal(size=W.shape), np.ones((K, points), bool)
     found = rigid(W, visible, ORTHOGRAPHIC)
     shown = Shown(found, Settings(), W, visible, visible, np.arange(K))
     model, first = begun(found, shown, 20)

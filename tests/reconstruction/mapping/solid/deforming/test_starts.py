@@ -1,7 +1,6 @@
 """What few modes cannot follow is not judged by them."""
 
 import numpy as np
-import pytest
 
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RestShape
@@ -28,7 +27,6 @@ def shirt(seed: int) -> tuple[Array, Array, Mask]:
     return in_camera, W + 0.3 * rng.normal(size=W.shape), rng.random((K, P)) > 0.1
 
 
-@pytest.mark.slow
 def test_small_folds_do_not_put_poses_wrong() -> None:
     shapes, W, visible = shirt(3)
     solid = bundle_adjust(np.where(visible[:, None], W, np.nan), visible, ORTHOGRAPHIC, refine_focal=False)
