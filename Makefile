@@ -30,7 +30,7 @@ test-all: .venv/ready
 
 test-opencv4: .venv-opencv4/ready
 	$(BIN4)/python -c 'import cv2; assert cv2.__version__.startswith("4."), cv2.__version__'
-	$(BIN4)/python $(PYTEST) tests/tracking tests/app/pipeline/test_session.py
+	$(BIN4)/python $(PYTEST) tests/tracking tests/app/pipeline/test_live.py
 
 lint: .venv/ready
 	$(BIN)/ruff check .

@@ -10,6 +10,8 @@ from app.footage.catalog import CASES
 from app.footage.clip import Clip
 from tests.robustness.degraded import Result, run
 
+pytestmark = pytest.mark.slow
+
 FRAMES = 100
 KINECT_ROI = (195, 95, 325, 265)
 
@@ -22,12 +24,12 @@ def outcome(clip: Clip, name: str, folder: Path) -> Result:
 @pytest.mark.parametrize(
     ("name", "losses"),
     [
-        pytest.param("light in rolling bands", 0, marks=pytest.mark.slow),
-        pytest.param("background moving, region loose", 0, marks=pytest.mark.slow),
+        ("light in rolling bands", 0),
+        ("background moving, region loose", 0),
         ("background moving, region found", 0),
-        pytest.param("a title card first", 0, marks=pytest.mark.slow),
-        pytest.param("leaves the picture, all", 2, marks=pytest.mark.slow),
-        pytest.param("watermark over 30 %", 0, marks=pytest.mark.slow),
+        ("a title card first", 0),
+        ("leaves the picture, all", 2),
+        ("watermark over 30 %", 0),
     ],
 )
 def test_the_sample_holds(tmp_path: Path, name: str, losses: int) -> None:
@@ -37,7 +39,6 @@ def test_the_sample_holds(tmp_path: Path, name: str, losses: int) -> None:
     assert int(str(result.words["losses"])) <= losses
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_the_printed_sheet_holds(shared_data: Path, tmp_path: Path, name: str) -> None:
     clip = Clip(shared_data / "kinect_paper.mp4", shared_data / "kinect_paper_gt.npz", KINECT_ROI, 113)

@@ -7,7 +7,7 @@ import pytest
 
 from tests.robustness.fuzz import ALL, fuzz, make_samples
 
-FEW, MORE = range(4), range(4, 24)
+FEW, MORE = range(2), range(2, 24)
 
 
 @pytest.fixture(scope="module")

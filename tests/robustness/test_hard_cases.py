@@ -38,11 +38,12 @@ def test_sheets_bent_much_the_same_way_all_along(tmp_path: Path, kind: str, boun
     assert outcome.score.e3d <= bound
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "points", "damage", "bound"),
     [
-        pytest.param("waving-3", 80, Damage(0.4, 0.3, 0.05), 0.02, marks=pytest.mark.slow),
-        pytest.param("rolling", 80, Damage(0.4, 0.3, 0.05), 0.016, marks=pytest.mark.slow),
+        ("waving-3", 80, Damage(0.4, 0.3, 0.05), 0.02),
+        ("rolling", 80, Damage(0.4, 0.3, 0.05), 0.016),
         ("cone", 30, Damage(0.2, 0.3), 0.02),  # some frames show fewer than 20 points
     ],
 )

@@ -54,6 +54,7 @@ def test_one_recording(mortal_viewer: Viewer, tmp_path: Path) -> None:
     assert [view.reports for view in mortal_viewer.client.get_state().views if view.reports] == []
 
 
+@pytest.mark.slow
 def test_two_recordings_side_by_side(mortal_viewer: Viewer, tmp_path: Path) -> None:
     first = write_run(tmp_path / "first.rrd", frames=FRAMES, unsure=False)
     second = write_run(tmp_path / "second.rrd", frames=FRAMES // 2, unsure=False)

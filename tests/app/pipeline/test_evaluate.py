@@ -93,13 +93,14 @@ def test_a_rest_shape_gives_the_shapes_its_units(shared_data: Path, tmp_path: Pa
     np.testing.assert_allclose(shapes[1], MILLI * shapes[0], rtol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "rest"),
     [
-        pytest.param("flag250_perspective", "first-truth", marks=SLOW),
-        pytest.param("flag250", "auto", marks=SLOW),
-        pytest.param("flag250_perspective", "auto", marks=SLOW),
-        pytest.param("face37", "auto", marks=SLOW),
+        ("flag250_perspective", "first-truth"),
+        ("flag250", "auto"),
+        ("flag250_perspective", "auto"),
+        ("face37", "auto"),
         ("waving_3", "auto"),
     ],
 )

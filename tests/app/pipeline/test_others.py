@@ -75,6 +75,7 @@ def test_its_picture_is_painted_on_it_again(film: Path) -> None:
     assert A + AGAIN - 5 <= painted.painted_frames <= A + AGAIN
 
 
+@pytest.mark.slow
 def test_only_so_many_are_kept(film: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.pipeline.others.MOST_KEPT", 0)
     for name in ("AFTER_CUT_S", "AFTER_COVER_S"):

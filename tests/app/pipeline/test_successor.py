@@ -191,6 +191,7 @@ def test_a_picture_stays_on_the_object_it_was_put_on(two_scenes: Path) -> None:
         assert sum(1 for _ in video) == FRAMES
 
 
+@pytest.mark.slow
 def test_a_batch_keeps_the_parts(modeshape: Command, two_scenes: Path, here: Path) -> None:
     done = modeshape("batch", two_scenes, "--out", "out", "--json", f"--options={' '.join(map(str, FAST))} --image none")
     assert done.code == 0, done.err

@@ -11,7 +11,7 @@ from tests.reconstruction.mapping.solid.deforming.test_learning import keyframes
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE
 
 
-@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
+@pytest.mark.parametrize("camera", [PERSPECTIVE, pytest.param(ORTHOGRAPHIC, marks=pytest.mark.slow)])
 def test_what_some_points_have_told_holds_for_all(camera: Camera) -> None:
     shapes, W, visible = keyframes(0.06, camera, points=600)
     every = shown(mapped(W, visible, camera), W, visible)

@@ -97,6 +97,7 @@ def test_what_was_asked_for_stays(settings: Settings) -> None:
     assert with_deformations(found, settings, W, visible, FRAMES) is found
 
 
+@pytest.mark.slow
 def test_keyframes_stay_in_the_order_of_the_map() -> None:
     _, W, visible = keyframes(0.06)
     order = np.random.default_rng(5).permutation(K)
@@ -107,7 +108,7 @@ def test_keyframes_stay_in_the_order_of_the_map() -> None:
     assert np.degrees(np.arccos((np.trace(turn, axis1=1, axis2=2).clip(-1, 3) - 1) / 2)).max() < 10
 
 
-@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
+@pytest.mark.parametrize("camera", [PERSPECTIVE, pytest.param(ORTHOGRAPHIC, marks=pytest.mark.slow)])
 def test_on_the_way_the_rest_shape_is_learned_too(camera: Camera) -> None:
     """Without what deformations are like: the Gaussian knows none that are to come."""
     shapes, W, visible = keyframes(0.09, camera)
@@ -122,6 +123,7 @@ def test_on_the_way_the_rest_shape_is_learned_too(camera: Camera) -> None:
     assert errors[1] < 0.058
 
 
+@pytest.mark.slow
 def test_the_mirror_image_has_the_mirrored_deformations() -> None:
     _, W, visible = keyframes(0.06, ORTHOGRAPHIC)
     known = with_deformations(mapped(W, visible, ORTHOGRAPHIC), Settings(), W, visible, FRAMES)

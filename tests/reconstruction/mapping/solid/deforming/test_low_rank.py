@@ -99,7 +99,11 @@ def test_gross_errors_spoil_no_poses(seed: int) -> None:
 
 @pytest.mark.parametrize(
     ("camera", "swing", "seed", "better", "sure"),
-    [(PERSPECTIVE, 1.0, 2, True, True), (PERSPECTIVE, 0.0, 2, False, True), (ORTHOGRAPHIC, 1.6, 4, True, False)],
+    [
+        (PERSPECTIVE, 1.0, 2, True, True),
+        (PERSPECTIVE, 0.0, 2, False, True),
+        pytest.param(ORTHOGRAPHIC, 1.6, 4, True, False, marks=pytest.mark.slow),
+    ],
     ids=["swings", "rigid", "few modes find more about the rigid shape than many"],
 )
 def test_poses_are_believed_if_they_make_images_likelier(
@@ -130,6 +134,7 @@ def test_a_shape_half_as_deep_that_turns_twice_as_far_looks_alike() -> None:
     assert np.abs(off - moved).mean() < 0.3 * np.abs(moved).mean()
 
 
+@pytest.mark.slow
 def test_what_shrinks_while_it_turns_hardly_may_be_of_another_depth() -> None:
     rng, points = np.random.default_rng(1), 48
     shape = rng.normal(size=(3, points))
