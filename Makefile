@@ -45,7 +45,8 @@ wheel: .venv/ready
 	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist .
 	$(PYTHON) -m venv .venv-wheel
 	PIP_CONSTRAINT=constraints.txt .venv-wheel/bin/python -m pip install --quiet --disable-pip-version-check dist/*.whl
-	mkdir .venv-wheel/empty && cd .venv-wheel/empty && ../bin/modeshape demo --json
+	mkdir .venv-wheel/empty && cd .venv-wheel/empty && ../bin/modeshape demo --json > summary.json
+	$(PYTHON) -c 'import json; assert json.load(open(".venv-wheel/empty/summary.json"))["e3d"] < 0.01'
 	rm -rf .venv-wheel
 
 # Those of the README, in docs/.

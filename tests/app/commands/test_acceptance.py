@@ -175,6 +175,7 @@ def test_a_talking_face_is_followed(modeshape: Command, shared_data: Path, here:
     verify(here / "face.rrd")
 
 
+@pytest.mark.slow  # the gate tries it with the wheel
 def test_demo(modeshape: Command, here: Path) -> None:
     outcome = modeshape("demo", "--json")
     assert outcome.code == 0, outcome.err

@@ -14,6 +14,7 @@ from tests.reconstruction.mapping.bending import CAMERA, waving_sheet
 from tests.reconstruction.mapping.test_map import FRAMES, POINTS, waving
 
 
+@pytest.mark.slow
 def test_bends_that_the_usual_functions_cut_off_are_followed_by_finer_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     W, S = waving_sheet(np.random.default_rng(5), FRAMES, amplitude=0.9, points=POINTS)
     every = np.ones((FRAMES, POINTS), bool)

@@ -62,7 +62,7 @@ def test_a_shape_known_before_is_where_each_view_shows_it(rng: np.random.Generat
         assert np.nanmax(np.nanmedian(build.residual(bundle)[:, right], axis=1)) < off  # affine at first
 
 
-@pytest.mark.parametrize("seed", [5, 8])
+@pytest.mark.parametrize("seed", [5, pytest.param(8, marks=pytest.mark.slow)])
 def test_a_box_that_is_seen_all_around_has_all_its_sides(seed: int) -> None:
     rng = np.random.default_rng(seed)
     u, v = (55 * np.stack(np.meshgrid(*2 * [np.linspace(-1, 1, 6)]))).reshape(2, -1)
