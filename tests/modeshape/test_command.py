@@ -42,6 +42,7 @@ def test_run_retexture_and_batch_beside_foreign_modules(folder: Path, video: Pat
     assert json.loads(done.out)["failed"] == 0
 
 
+@pytest.mark.slow
 def test_benchmarks_beside_foreign_modules(folder: Path, video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     monkeypatch.delenv("PYTHONPATH", raising=False)

@@ -112,6 +112,7 @@ def test_nobody_answers_at_the_scheduler(modeshape: Command, four: list[Path], m
     assert "no Dask scheduler answers at tcp://127.0.0.1:9" in outcome.err
 
 
+@pytest.mark.slow
 def test_equal_names_get_recordings_of_their_own(modeshape: Command, videos: Path, here: Path) -> None:
     for folder in ("one", "two"):
         (here / folder).mkdir()

@@ -60,6 +60,7 @@ def test_an_earlier_object_goes_on_on_its_mesh(film: Path) -> None:
         assert np.isfinite(shapes["S"][-AGAIN + 5 :]).all()
 
 
+@pytest.mark.slow
 def test_its_picture_is_painted_on_it_again(film: Path) -> None:
     cv2.imwrite("red.png", RED)
     model = Model(modes=5, bootstrap_frames=20)

@@ -15,8 +15,10 @@ from app.synthetic.tracks import SEVERE, USUAL, tracks
 from app.synthetic.video import Renderer, region, write_video
 from tracking.video import Video
 
+CLOTHS = ("cloth", "towel", "blanket")  # take time to hang
 
-@pytest.mark.parametrize("kind", KINDS)
+
+@pytest.mark.parametrize("kind", [pytest.param(kind, marks=pytest.mark.slow if kind in CLOTHS else ()) for kind in KINDS])
 def test_it_is_in_view_and_moves_smoothly(kind: str) -> None:
     one = scene(kind, 5)
     places = grid(9, 7)

@@ -147,7 +147,7 @@ def test_part_that_is_out_of_sight_does_not_spoil_the_rest() -> None:
     assert float(e3d(found.shapes()[whole], S[whole]).mean()) < 0.03
 
 
-@pytest.mark.parametrize("off", [0.4, 0.7, 0.8, 1.25, 2.0, 2.5])
+@pytest.mark.parametrize("off", [0.4, 2.5, *(pytest.param(off, marks=pytest.mark.slow) for off in (0.7, 0.8, 1.25, 2.0))])
 def test_lengths_hold_the_focal_length(off: float) -> None:
     W, S, _ = waving()
     wrong = sheet(W, SEEN, replace(CAMERA, focal_px=off * CAMERA.focal_px))

@@ -53,7 +53,7 @@ def turned(B: Array, state: State) -> Array:
     return state.scaled_rotations() @ (B[:3] + state.Lambda @ B[3:-1])
 
 
-@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
+@pytest.mark.parametrize("camera", [PERSPECTIVE, pytest.param(ORTHOGRAPHIC, marks=pytest.mark.slow)])
 def test_depth_of_deformations_is_learned(camera: Camera) -> None:
     shapes, W, visible = keyframes(0.06, camera)
     found = mapped(W, visible, camera)

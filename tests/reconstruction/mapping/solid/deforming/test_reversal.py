@@ -60,7 +60,7 @@ def turned(B: Array, state: State) -> Array:
     return state.scaled_rotations() @ (B[:3] + state.Lambda @ B[3:-1])
 
 
-@pytest.mark.parametrize("camera", [ORTHOGRAPHIC, PERSPECTIVE])
+@pytest.mark.parametrize("camera", [ORTHOGRAPHIC, pytest.param(PERSPECTIVE, marks=pytest.mark.slow)])
 def test_a_fish_that_turns_around_is_learned(camera: Camera, monkeypatch: pytest.MonkeyPatch) -> None:
     W, placed, _, model, state = fish(camera)
 
