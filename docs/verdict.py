@@ -1,4 +1,4 @@
-"""Writes docs/verdict.md: what verdicts and standard deviations are worth, by cases with a truth. Takes ten minutes.
+"""Writes docs/verdict.md: what verdicts and standard deviations are worth, by cases with a truth. Takes half an hour.
 
 .venv/bin/python -m docs.verdict ../shared/data
 """
