@@ -31,7 +31,8 @@ def test_made_up_things_with_gaps_noise_and_gross_errors(tmp_path: Path, kind: s
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "bound"), [("rolling", 0.006), ("cone", 0.0045)])  # in turns 1.2, 1.0 %
+# Shapes and lengths in turns have 1.2, 1.0 %.
+@pytest.mark.parametrize(("kind", "bound"), [("rolling", 0.006), ("cone", 0.0045)])
 def test_sheets_bent_much_the_same_way_all_along(tmp_path: Path, kind: str, bound: float) -> None:
     outcome = evaluated(tracks(scene(kind, 1)), tmp_path)
     assert outcome.score is not None

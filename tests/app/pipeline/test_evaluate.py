@@ -93,7 +93,7 @@ def test_a_rest_shape_gives_the_shapes_its_units(shared_data: Path, tmp_path: Pa
     np.testing.assert_allclose(shapes[1], MILLI * shapes[0], rtol=1e-6)
 
 
-@pytest.mark.slow
+@SLOW
 @pytest.mark.parametrize(
     ("file", "rest"),
     [

@@ -75,7 +75,11 @@ def check(outcome: Outcome, words: str) -> None:
 
 @pytest.mark.parametrize(
     ("command", "name"),
-    [*((COMMANDS[0], name) for name in NO_RECORDINGS), *((command, "text.rrd") for command in COMMANDS[1:])],
+    [
+        pytest.param(command, name, marks=() if command == COMMANDS[0] or name == "text.rrd" else pytest.mark.slow)
+        for command in COMMANDS
+        for name in NO_RECORDINGS
+    ],
 )
 def test_what_is_no_recording(modeshape: Command, files: Path, command: str, name: str) -> None:
     before = tree(files)
