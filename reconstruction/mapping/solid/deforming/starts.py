@@ -34,7 +34,8 @@ def likeliest(start: Attempt, shown: Shown, begin: Start = at_once) -> tuple[Att
     told by few, with what few find themselves. Mean shapes are the rigid one, by factorisation (`low_rank`), or shallower.
     But few modes cannot follow small folds, and then wrong poses suit them best: many modes must find the best of them
     likelier, too, unless they would explain anything.
-    Last comes what is learned where poses do not turn back (`turning`), if it turns more steadily and is about as likely.
+    Last comes what is learned where poses do not turn back (`turning`), if it turns more steadily and few modes find it
+    about as likely.
 
     Args:
         start: where learning about the rigid shape has begun.
@@ -56,20 +57,24 @@ def likeliest(start: Attempt, shown: Shown, begin: Start = at_once) -> tuple[Att
     best = min(finds, key=lambda one: one.unlikeliness, default=told)
     one, end = told, usual
     if best.unlikeliness < told.unlikeliness - LIKELIER:
-        further = gone_on(best, shown)
-        if further.unlikeliness < usual.unlikeliness or explains_anything(usual, shown):
-            one, end = best, further
+        one, end = further(best, shown, (one, end))
     if turned := turned_on(end, shown, USUAL_MODES, FEW_POINTS):
         finds.append(turned)
         steadier = unsteadiness(turned.known.state, shown.frames) < unsteadiness(end.known.state, shown.frames)
         if steadier and turned.unlikeliness < one.unlikeliness + LIKELIER:
-            one, end = turned, gone_on(turned, shown)
+            one, end = further(turned, shown, (one, end))
     if end is usual and finds:
         one = finds[0]  # of few modes by themselves: those of many differ from all of theirs
     alike = [other for other in finds if other.unlikeliness < one.unlikeliness + ALIKE]
     mirrored = not camera.perspective
     otherwise = max((apart(one.known.shapes, other.known.shapes, mirrored=mirrored) for other in alike), default=0.0)
     return end, otherwise
+
+
+def further(one: Attempt, shown: Shown, known: tuple[Attempt, Attempt]) -> tuple[Attempt, Attempt]:
+    """What few modes have found, and what many make of it; what is known in both ways if many do not find it likelier."""
+    end = gone_on(one, shown)
+    return (one, end) if end.unlikeliness < known[1].unlikeliness or explains_anything(end, shown) else known
 
 
 def explains_anything(attempt: Attempt, shown: Shown) -> bool:

@@ -1,5 +1,7 @@
 """What few modes cannot follow is not judged by them."""
 
+from functools import partial
+
 import numpy as np
 
 from reconstruction.arrays import Array, Mask
@@ -8,7 +10,7 @@ from reconstruction.evaluation import e3d
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.deforming.attempt import Attempt, Shown, begun
 from reconstruction.mapping.solid.deforming.learning import RIGHTED
-from reconstruction.mapping.solid.deforming.starts import explains_anything, likeliest
+from reconstruction.mapping.solid.deforming.starts import explains_anything, further, likeliest, shallower, tried
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import MOST_MODES, Settings
 from tests.reconstruction.world import ORTHOGRAPHIC, seen, spread, turns
@@ -38,3 +40,6 @@ def test_small_folds_do_not_put_poses_wrong() -> None:
     state, B = end.known.state, end.known.B
     assert not explains_anything(end, shown)
     assert e3d(state.scaled_rotations() @ (B[:3] + state.Lambda @ B[3:-1]), shapes).mean() < 0.03
+    flatter = tried(shown, partial(shallower, solid.motion, 0.3))
+    assert flatter is not None
+    assert further(flatter, shown, (start, end)) == (start, end)
