@@ -8,7 +8,7 @@ from typing import Literal
 
 from app.pipeline.estimates import Scores
 from app.pipeline.quality.finding import Grade
-from app.pipeline.quality.keyframes import BY_KEYFRAMES
+from app.pipeline.quality.keyframes import RECOVERED
 from app.pipeline.quality.verdict import verdict
 from app.pipeline.stopwatch import Stopwatch
 from app.pipeline.tracked_object import TrackedObject
@@ -17,7 +17,7 @@ from app.terminal.summary import Summary, print_lines
 from tracking.guarded import Change, Guarded
 from tracking.sources.capture import few_bits
 
-KINDS = BY_KEYFRAMES | {"mesh": "mesh given", "truth": "shape given"}
+KINDS = RECOVERED | {"mesh": "mesh given", "truth": "shape given"}
 
 
 @dataclass

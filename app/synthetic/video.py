@@ -91,7 +91,9 @@ def write_video(scene: Scene, folder: Path) -> Filmed:
     finally:
         writer.release()
     frames = np.arange(0, scene.frames, TRUTH_EVERY)
-    shapes = np.stack([scene.points(grid(27, 19), int(frame)) for frame in frames])
+    places = grid(27, 19)
+    places = places[scene.faces_camera(places, 0) > 0]  # those on its far side would be taken for near ones before them
+    shapes = np.stack([scene.points(places, int(frame)) for frame in frames])
     W = np.stack([project(shape).T for shape in shapes])
     np.savez_compressed(filmed.truth, W_px=W, S_gt=shapes.transpose(0, 2, 1), gt_frames=frames, K=K)
     return filmed

@@ -54,7 +54,7 @@ class Map:
     @property
     def is_sheet(self) -> bool:
         """Whether it is bent, not turned: a plane or a sheet; by its relief where no keyframes say."""
-        return self.rest.flat if self.evidence is None else self.rest.kind != "rigid"
+        return self.rest.flat or self.rest.kind == "isometric" if self.evidence is None else self.rest.kind != "rigid"
 
     def modelled(self, settings: Settings, mesh: Mesh | None = None, own_motion: Array | None = None) -> Model:
         """The rest shape with its modes; its mesh may be given, and how its points move (d, p), as for `modal_basis`.

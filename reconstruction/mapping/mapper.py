@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.first.bootstrap import bootstrap
 from reconstruction.mapping.keyframes import KEYFRAMES, Keyframes, spread_of
 from reconstruction.mapping.map import Map, nearest_first
-from reconstruction.mapping.maps import map_of
+from reconstruction.mapping.maps import first_sheet, map_of
 from reconstruction.mapping.selection import Kind
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations
 from reconstruction.mapping.start import Start, at_once
@@ -25,6 +25,7 @@ LATENCY = 90  # frames after which a map that another process makes is in force:
 FIRST_LATENCY = 0.25  # the same of a first model, of the frames it is made of: it takes a fraction of the time
 CATCH_UP, LIVE_CATCH_UP = 4, 2  # frames that get their shapes with each new one; live ones come on time meanwhile
 FEWEST = 10  # keyframes for a map
+FEW = 6  # for a first model
 MORE = 2  # times as many keyframes of a solid at the end: what deforms must be seen from many sides
 FEWEST_POINTS = 4  # that a frame shows, for a first model
 GROWN = 1.3  # times as far apart as at the last map the keyframes are before there is another,
@@ -144,29 +145,30 @@ class Mapper:
         return self._final
 
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
-        """Begin a first model, if it is time; at last by keyframes, where nothing goes on meanwhile.
-
-        Else a guess comes first: who looks on sees something soon, and files are reconstructed once more.
-        """
-        n, keyframes, settings = len(first), self._keyframes, self._settings
+        """Begin a first model, if it is time."""
+        n, settings = len(first), self._settings
         if self._first_job is None and (n in self._looks or self._looked < self._looks[-1] < n):
             last = n >= self._looks[-1]
             frames = *stacked(first), camera, settings
             due = self._frame + int(FIRST_LATENCY * n if self.latency else 0)
-            if (
-                last
-                and not self.latency
-                and settings.bootstrap_frames == "auto"
-                and keyframes
-                and len(keyframes.frames) >= FEWEST
-            ):
-                begun = self.start(first_of_all, *frames, *self._asked(camera))
-            elif self._live:
-                begun = self.start(with_modes, bootstrap, settings, *frames, last)
-            else:  # all frames wait for it, and who has no other work makes the modes sooner
-                begun = self.start(bootstrap, *frames, last)
+            by_keyframes = last and settings.bootstrap_frames == "auto" and self._by_keyframes(camera)
+            make = (first_of_all, *frames, by_keyframes) if by_keyframes else (bootstrap, *frames, last)
+            # All frames of a file wait for it, and who has no other work makes the modes sooner.
+            begun = self.start(with_modes, settings, *make) if self._live else self.start(*make)
             self._first_job = Job(begun, due)
             self.first_frames = self._looked = n
+
+    def _by_keyframes(self, camera: Camera) -> Callable[[], Map | None] | None:
+        """What gives a first model by keyframes: all, or a few where frames come meanwhile, so that it comes soon."""
+        if self._keyframes is None or len(self._keyframes.frames) < FEWEST:
+            return None
+        if not self.latency:
+            return partial(on_the_way, *self._asked(camera))
+        if self._settings.kind == "solid" or self._begin is None:
+            return None
+        W, visible, _ = self._keyframes.spread(FEW)
+        few = np.stack([self._begin[0], *W]), np.stack([self._begin[1], *visible])
+        return partial(first_sheet, *few, camera, self._settings.estimate_focal)
 
     def _look_again(self, camera: Camera) -> None:
         """Begin a map, if the keyframes have more to tell than when they were last looked at."""
@@ -176,7 +178,7 @@ class Mapper:
         if keyframes is None or self._map_job or self._frame + 1 < self._looks[-1] or len(keyframes.frames) < FEWEST:
             return
         if keyframes.extent > GROWN * self._extent or keyframes.version >= RENEWED * self._version:
-            begun = self.start(with_modes, on_the_way, self._settings, *self._asked(camera))
+            begun = self.start(with_modes, self._settings, on_the_way, *self._asked(camera))
             self._map_job = Job(begun, self._frame + self.latency)
 
     def _asked(self, camera: Camera) -> tuple[Any, ...]:
@@ -204,10 +206,9 @@ class Mapper:
     def _taken(self, found: Map, begin: tuple[Array, Mask]) -> Map:
         """A model that is in force from now on, posed first as in the frame where it begins."""
         self._first, self._known = None, found.rest.motion.shape
-        if found.seen is None:  # by first frames, in their order
-            return found
-        self._found = found
-        return nearest_first(found, *begin)
+        if found.evidence:
+            self._found = found
+        return nearest_first(found, *begin) if found.seen is not None else found  # by first frames, in their order
 
 
 def stacked(frames: list[tuple[Array, Mask]]) -> tuple[Array, Mask]:
@@ -215,7 +216,7 @@ def stacked(frames: list[tuple[Array, Mask]]) -> tuple[Array, Mask]:
     return np.stack([W for W, _ in frames]), np.stack([visible for _, visible in frames])
 
 
-def with_modes(make: Callable[..., Map | None], settings: Settings, *arguments: object) -> Map | None:
+def with_modes(settings: Settings, make: Callable[..., Map | None], *arguments: object) -> Map | None:
     """A map that is made with its modes, so that no frame has to wait for them."""
     found = make(*arguments)
     return found and replace(found, model=found.model or found.modelled(settings))
@@ -233,10 +234,12 @@ def on_the_way(settings: Settings, W: Array, visible: Mask, frames: Indices, *to
     return replace(learned, deformations=None)
 
 
-def first_of_all(W: Array, visible: Mask, camera: Camera, settings: Settings, *keyframes: Any) -> Map | None:
+def first_of_all(
+    W: Array, visible: Mask, camera: Camera, settings: Settings, by_keyframes: Callable[[], Map | None]
+) -> Map | None:
     """The first model: what first frames are sure of, else what keyframes tell, else a guess by the first frames.
 
-    Arguments as for `bootstrap` and `on_the_way`.
+    Arguments as for `bootstrap`.
     """
     first = W, visible, camera, settings
-    return bootstrap(*first, False) or on_the_way(*keyframes) or bootstrap(*first, True)
+    return bootstrap(*first, False) or by_keyframes() or bootstrap(*first, True)

@@ -32,8 +32,7 @@ OTHERWISE = 0.15  # of its size, that half of the keyframes find a solid elsewhe
 FAIR_BY_FOCAL, POOR_BY_FOCAL = 0.02, 0.05  # of its size, that shapes may be off by a focal length that was looked for
 SURELY = 3.0  # sureness of a sheet that nothing turns: cloth that stretches has up to 2.9, rolled paper 1.6 to 3.6
 MOSTLY = 2.4  # times what a solid leaves over a plane must: rigid ones, turned by 8°, have 2.9 and more, limbs up to 1.5
-RECOVERED = ("rigid", "plane")  # by the first frames
-BY_KEYFRAMES = {"isometric": "sheet", "rigid": "solid", "plane": "flat sheet"}  # kinds of rest shapes, in words
+RECOVERED = {"isometric": "sheet", "rigid": "solid", "plane": "flat sheet"}  # rest shapes that frames have told, in words
 
 MIRRORED = Verdict(
     "fair",
@@ -54,7 +53,7 @@ def evidence(found: Map, *, known: bool) -> Iterator[Verdict]:
         if found.rest.kind not in RECOVERED and found.rest.flat and not found.camera.perspective:
             yield MIRRORED
         return
-    made = BY_KEYFRAMES.get(found.rest.kind)
+    made = RECOVERED.get(found.rest.kind)
     says = "flat sheet" if found.evidence.kind == "flat" else found.evidence.kind
     if made not in (None, says):
         grade: Grade = "poor" if found.evidence.sureness > PLAIN else "fair"

@@ -8,7 +8,7 @@ import numpy as np
 from app.pipeline.quality.course import Course
 from app.pipeline.quality.finding import GRADES, Grade, Verdict
 from app.pipeline.quality.frames import errors, looks, seen
-from app.pipeline.quality.keyframes import BY_KEYFRAMES, evidence
+from app.pipeline.quality.keyframes import RECOVERED, evidence
 from reconstruction.mapping.map import Map
 
 
@@ -35,5 +35,5 @@ def verdict(course: Course, found: Map | None, bits_per_px: float | None = None,
 
 def praise(course: Course, found: Map) -> str:
     """Why it is good."""
-    kind = f"a {BY_KEYFRAMES[found.rest.kind]}" if found.rest.kind in BY_KEYFRAMES else "as given"
+    kind = f"a {RECOVERED[found.rest.kind]}" if found.rest.kind in RECOVERED else "as given"
     return f"{np.nanmedian(course.errors_px):.2g} px, {np.mean(course.shares):.0%} of the points seen, {kind} in many views"

@@ -52,6 +52,19 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
         ReconstructionError: the camera is orthographic, there are fewer than 3 frames or 20 points, images are not smooth,
             or lengths change.
     """
+    smooth = smooth_sheet(W, visible, camera)
+    if smooth.strain_beyond_noise <= CREASED or smooth.far:
+        return smooth
+    if other := mirrored(smooth):
+        return other
+    creases = creases_in(smooth.warps, W)
+    folds = [folded_sheet(creased(smooth.warps, W, visible, some), camera) for some in creases]
+    best = min((found for found in folds if found), key=lambda found: found.change, default=smooth)
+    return best if best.change < LESS * smooth.change else smooth
+
+
+def smooth_sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
+    """The same without creases, bent to the side where it comes out at once; arguments and errors as for `sheet`."""
     if not camera.perspective:
         raise ReconstructionError("a sheet's depths along its rays need a perspective camera")
     warps = smooth_warps(W, visible)
@@ -59,14 +72,7 @@ def sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet:
         raise ReconstructionError("a sheet of unknown shape needs 3 keyframes and 20 points")
     if (parallax := warps.parallax_over_size(W, visible)) > MOST_PARALLAX:
         raise ReconstructionError(f"no smooth surface: points are {parallax:.1%} of its size off it, together")
-    smooth = on_smooth_images(warps, camera)
-    if smooth.strain_beyond_noise <= CREASED or smooth.far:
-        return smooth
-    if other := mirrored(smooth):
-        return other
-    folds = [folded_sheet(creased(warps, W, visible, creases), camera) for creases in creases_in(warps, W)]
-    best = min((found for found in folds if found), key=lambda found: found.change, default=smooth)
-    return best if best.change < LESS * smooth.change else smooth
+    return on_smooth_images(warps, camera)
 
 
 def mirrored(found: IsometricSheet) -> IsometricSheet | None:

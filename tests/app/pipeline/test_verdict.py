@@ -8,7 +8,7 @@ import pytest
 from app.pipeline.quality.course import Course
 from app.pipeline.quality.frames import longest
 from app.pipeline.quality.verdict import verdict
-from reconstruction.basis.rest_shape import RestShape, RigidMotion
+from reconstruction.basis.rest_shape import Kind, RestShape, RigidMotion
 from reconstruction.camera import Camera
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.selection import Evidence
@@ -51,8 +51,9 @@ def test_a_moment_is_no_matter() -> None:
     assert verdict(course([0.003] * 50 + [0.045] * 2 + [0.003] * 50), SOLID).grade == "good"
 
 
-def test_nothing_known_but_the_first_frames() -> None:
-    said = verdict(course([0.001] * 50), replace(SOLID, evidence=None))
+@pytest.mark.parametrize("kind", ["rigid", "plane", "isometric"])
+def test_nothing_known_but_the_first_frames(kind: Kind) -> None:
+    said = verdict(course([0.001] * 50), replace(SOLID, evidence=None, rest=replace(REST, kind=kind)))
     assert said.grade == "fair"
     assert "film it" in said.reason
 

@@ -92,3 +92,9 @@ def test_a_video_comes_with_its_truth(tmp_path: Path) -> None:
     right, bottom = truth.W_px[0].max(axis=1)
     assert left < x < x + w < right
     assert top < y < y + h < bottom
+
+
+def test_a_far_side_is_no_truth_of_the_points_before_it(tmp_path: Path) -> None:
+    truth = load_truth(write_video(scene("drum", 1, frames=5), tmp_path).truth)
+    across, _, deep = np.ptp(truth.S[0], axis=1)
+    assert deep < 0.6 * across

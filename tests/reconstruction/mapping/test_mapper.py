@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from reconstruction.arrays import Array
 from reconstruction.basis.rest_shape import RestShape, RigidMotion
 from reconstruction.camera import Camera, quaternion_exp, rotation_from_quaternion
 from reconstruction.mapping import mapper
 from reconstruction.mapping.keyframes import KEYFRAMES
 from reconstruction.mapping.map import Map
-from reconstruction.mapping.mapper import FEWEST, FIRST_LATENCY, LATENCY, MORE, RENEWED, Mapper, nearest_first
+from reconstruction.mapping.mapper import FEW, FEWEST, FIRST_LATENCY, LATENCY, MORE, RENEWED, Mapper, nearest_first
 from reconstruction.mapping.start import at_once
 from reconstruction.settings import FIRST_LOOKS, Settings
 
@@ -31,6 +32,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Models that say how many frames they are of."""
     monkeypatch.setattr(mapper, "bootstrap", lambda W, *others: model(len(W)) if others[-1] else None)
     monkeypatch.setattr(mapper, "map_of", lambda W, *_, last=None: model(len(last()[0] if last else W)))
+    monkeypatch.setattr(mapper, "first_sheet", lambda *_: None)
 
 
 class Later:
@@ -91,15 +93,25 @@ def test_live_ones_are_in_force_as_soon_as_they_are_there() -> None:
     assert used.first_frames == 82
 
 
-@pytest.mark.parametrize(("latency", "by"), [(0, "keyframes"), (LATENCY, "frames")])
-def test_a_guess_comes_first_where_others_wait(latency: int, by: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("latency", "sheet", "poses"),
+    [(0, True, KEYFRAMES), (LATENCY, True, FEW + 1), (LATENCY, False, FIRST_LOOKS[-1])],
+    ids=["of all keyframes", "a sheet by a few where frames come meanwhile", "a guess where they are none"],
+)
+def test_the_first_model(latency: int, sheet: bool, poses: int, monkeypatch: pytest.MonkeyPatch) -> None:
     seen = np.ones(POINTS, bool)
-    monkeypatch.setattr(mapper, "map_of", lambda W, *_: replace(model(len(W)), seen=np.ones((len(W), POINTS), bool)))
+
+    def by_keyframes(W: Array, *_: object) -> Map:
+        return replace(model(len(W)), seen=np.ones((len(W), POINTS), bool))
+
+    monkeypatch.setattr(mapper, "map_of", by_keyframes)
+    monkeypatch.setattr(
+        mapper, "first_sheet", lambda W, *_: by_keyframes(W) if sheet and (W[0] == image(0)).all() else None
+    )
     used = Mapper(Settings(), at_once, latency=latency)
     found = [used.add(image(f), seen, CAMERA, (image(0), seen)) for f in range(FIRST_LOOKS[-1] + 20)]
     first = next(one for one in found if one is not None)
-    assert len(first.rest.motion.s) == (KEYFRAMES if by == "keyframes" else FIRST_LOOKS[-1])
-    assert (first.seen is None) == (by == "frames")
+    assert len(first.rest.motion.s) == poses
 
 
 def test_where_keyframes_do_not_tell_it_begins_with_a_guess(monkeypatch: pytest.MonkeyPatch) -> None:
