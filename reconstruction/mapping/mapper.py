@@ -13,9 +13,10 @@ from reconstruction.arrays import Array, Indices, Mask
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.mapping.first.bootstrap import bootstrap
+from reconstruction.mapping.first_sight import first_sight
 from reconstruction.mapping.keyframes import KEYFRAMES, Keyframes, spread_of
 from reconstruction.mapping.map import Map, nearest_first
-from reconstruction.mapping.maps import first_sheet, map_of
+from reconstruction.mapping.maps import map_of
 from reconstruction.mapping.selection import Kind
 from reconstruction.mapping.solid.deforming.learned_map import with_deformations
 from reconstruction.mapping.start import Start, at_once
@@ -151,24 +152,22 @@ class Mapper:
             last = n >= self._looks[-1]
             frames = *stacked(first), camera, settings
             due = self._frame + int(FIRST_LATENCY * n if self.latency else 0)
-            by_keyframes = last and settings.bootstrap_frames == "auto" and self._by_keyframes(camera)
+            by_keyframes = last and settings.bootstrap_frames == "auto" and self._by_keyframes(first[0], camera)
             make = (first_of_all, *frames, by_keyframes) if by_keyframes else (bootstrap, *frames, last)
             # All frames of a file wait for it, and who has no other work makes the modes sooner.
             begun = self.start(with_modes, settings, *make) if self._live else self.start(*make)
             self._first_job = Job(begun, due)
             self.first_frames = self._looked = n
 
-    def _by_keyframes(self, camera: Camera) -> Callable[[], Map | None] | None:
-        """What gives a first model by keyframes: all, or a few where frames come meanwhile, so that it comes soon."""
+    def _by_keyframes(self, first: tuple[Array, Mask], camera: Camera) -> Callable[[], Map | None] | None:
+        """What gives a first model by keyframes: all, or a few and the first frame, so that it comes soon."""
         if self._keyframes is None or len(self._keyframes.frames) < FEWEST:
             return None
         if not self.latency:
             return partial(on_the_way, *self._asked(camera))
-        if self._settings.kind == "solid" or self._begin is None:
-            return None
         W, visible, _ = self._keyframes.spread(FEW)
-        few = np.stack([self._begin[0], *W]), np.stack([self._begin[1], *visible])
-        return partial(first_sheet, *few, camera, self._settings.estimate_focal)
+        seen = np.stack([first[1], *visible])
+        return partial(first_sight, np.where(seen[:, None], np.stack([first[0], *W]), np.nan), seen, camera, self._settings)
 
     def _look_again(self, camera: Camera) -> None:
         """Begin a map, if the keyframes have more to tell than when they were last looked at."""

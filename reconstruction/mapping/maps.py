@@ -1,7 +1,6 @@
 """What keyframes show: which kind of object, and its map, of a solid, a flat sheet, or a sheet that bends."""
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 
@@ -12,17 +11,7 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis.mesh import ratio_of_sizes
 from reconstruction.basis.rest_shape import RestShape, RigidMotion, completed, medoid
 from reconstruction.camera import Camera, lens, nearest_rotation
-from reconstruction.mapping.isometric.adjustment import (
-    FEW_ROUNDS,
-    KEPT,
-    MOST_ROUNDS,
-    bundled,
-    in_halves,
-    mirrored,
-    refined,
-    sheet,
-    smooth_sheet,
-)
+from reconstruction.mapping.isometric.adjustment import FEW_ROUNDS, MOST_ROUNDS, bundled, in_halves, refined, sheet
 from reconstruction.mapping.isometric.focal import under_its_focal_length
 from reconstruction.mapping.isometric.likeliest import likeliest
 from reconstruction.mapping.isometric.sheet import USUAL_STRETCH, IsometricSheet
@@ -89,30 +78,9 @@ def map_of(
             found = rigid_map(*by, camera, evidence, flat=flat, estimate_focal=estimate_focal, known=known, last=patient)
     except (ReconstructionError, np.linalg.LinAlgError):  # the latter of points that lie as none do
         return None
-    return replace(found, seen=by[1], focal_note=focal_note(found, camera, estimate_focal))
-
-
-def focal_note(found: Map, camera: Camera, estimate_focal: bool) -> str:
-    """How its focal length was found, in words, if it was to be estimated; arguments as for `map_of`."""
-    if not (estimate_focal and camera.perspective):
-        return ""
-    f, source = found.camera.focal_px, f"{len(found.rest.motion.R)} keyframes{'' if found.sheet else ' and what is usual'}"
-    return ASSUMED.format(f) if np.isclose(f, camera.focal_px, rtol=1e-9) else f"focal length {f:.0f} px, from {source}"
-
-
-def first_sheet(W: Array, visible: Mask, camera: Camera, estimate_focal: bool) -> Map | None:
-    """The sheet that a few keyframes show, in a fraction of a map's time; None if lengths are not kept or it is far.
-
-    It is not compared with a solid, has no creases, and foresees no frames, which takes long. Its rest shape is that of the
-    first keyframe, so that frames from there on begin on the right side of its bends. Arguments as for `map_of`.
-    """
-    with suppress(ReconstructionError, np.linalg.LinAlgError):
-        smooth = smooth_sheet(W, visible, camera)
-        found = smooth if smooth.strain_beyond_noise < KEPT else mirrored(smooth)
-        if found and not found.far:
-            made = sheet_map(W, visible, camera, found, None, estimate_focal=False, at=0, last=False)
-            return replace(made, sheet=None, seen=visible, focal_note=focal_note(made, camera, estimate_focal))
-    return None
+    f, source = found.camera.focal_px, f"{len(by[0])} keyframes{'' if found.sheet else ' and what is usual'}"
+    told = ASSUMED.format(f) if np.isclose(f, camera.focal_px, rtol=1e-9) else f"focal length {f:.0f} px, from {source}"
+    return replace(found, seen=by[1], focal_note=told if estimate_focal and camera.perspective else "")
 
 
 def rigid_map(

@@ -32,7 +32,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Models that say how many frames they are of."""
     monkeypatch.setattr(mapper, "bootstrap", lambda W, *others: model(len(W)) if others[-1] else None)
     monkeypatch.setattr(mapper, "map_of", lambda W, *_, last=None: model(len(last()[0] if last else W)))
-    monkeypatch.setattr(mapper, "first_sheet", lambda *_: None)
+    monkeypatch.setattr(mapper, "first_sight", lambda *_: None)
 
 
 class Later:
@@ -106,7 +106,7 @@ def test_the_first_model(latency: int, sheet: bool, poses: int, monkeypatch: pyt
 
     monkeypatch.setattr(mapper, "map_of", by_keyframes)
     monkeypatch.setattr(
-        mapper, "first_sheet", lambda W, *_: by_keyframes(W) if sheet and (W[0] == image(0)).all() else None
+        mapper, "first_sight", lambda W, *_: by_keyframes(W) if sheet and (W[0] == image(0)).all() else None
     )
     used = Mapper(Settings(), at_once, latency=latency)
     found = [used.add(image(f), seen, CAMERA, (image(0), seen)) for f in range(FIRST_LOOKS[-1] + 20)]

@@ -1,4 +1,4 @@
-"""A first model of a sheet that is never flat: in time, and only where its lengths are kept."""
+"""A first model of what is never flat: in time, and only where it is plain."""
 
 import numpy as np
 import pytest
@@ -6,17 +6,17 @@ import pytest
 from reconstruction.arrays import Array
 from reconstruction.camera import Camera
 from reconstruction.evaluation import e3d
+from reconstruction.mapping.first_sight import first_sight
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.mapper import LATENCY, Mapper
-from reconstruction.mapping.maps import first_sheet
 from reconstruction.online import Reconstruction
 from reconstruction.settings import Settings
 from tests.reconstruction.mapping.bending import CAMERA, lifted_page, stretching_sheet, waving_sheet
-from tests.reconstruction.world import ORTHOGRAPHIC
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, turns
 
 
-def first(W: Array, camera: Camera = CAMERA) -> Map | None:
-    return first_sheet(W, np.ones((len(W), W.shape[2]), np.bool_), camera, estimate_focal=True)
+def first(W: Array, camera: Camera = CAMERA, settings: Settings | None = None) -> Map | None:
+    return first_sight(W, np.ones((len(W), W.shape[2]), np.bool_), camera, settings or Settings(estimate_focal=True))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -24,6 +24,7 @@ def test_it_is_shaped_as_in_its_first_keyframe(seed: int) -> None:
     W, S = waving_sheet(np.random.default_rng(seed), frames=7)
     found = first(W)
     assert found is not None
+    assert found.rest.kind == "isometric"
     assert e3d(found.rest.motion.shape[None], S[:1])[0] < 0.02
     assert "assumed" in found.focal_note
 
@@ -37,6 +38,23 @@ def test_a_page_bends_to_its_own_side() -> None:
 
 def test_what_does_not_keep_its_lengths_is_none() -> None:
     assert first(stretching_sheet(np.random.default_rng(1), 0.3, frames=7)[0]) is None
+
+
+@pytest.mark.parametrize(("degrees", "swell"), [(30.0, 0.04), (5.0, 0.0)], ids=["deforms", "hardly turns"])
+def test_a_solid(degrees: float, swell: float) -> None:
+    rng = np.random.default_rng(2)
+    shape, R = relief(rng, 120), turns(7, degrees)
+    swollen = shape * (1 + swell * rng.normal(size=(7, 1, 1)) * np.sin(shape[:1] / 20))
+    W = seen(swollen, R, PERSPECTIVE)[0] + 0.1 * rng.normal(size=(7, 2, 120))
+    found = first(W, PERSPECTIVE)
+    assert found is not None
+    assert found.rest.kind == "rigid"
+    assert e3d(found.rest.motion.shape[None], shape[None])[0] < 0.1
+
+
+def test_what_is_told() -> None:
+    W, _ = waving_sheet(np.random.default_rng(0), frames=7)
+    assert first(W, settings=Settings(rest_shape="solid")) is None
 
 
 def test_what_is_far_away_tells_no_depth() -> None:
