@@ -7,6 +7,7 @@ import numpy as np
 
 from app.arrays import Flags
 from app.pipeline.quality.course import Course
+from app.pipeline.quality.facing import at_once
 from app.pipeline.quality.finding import Grade, Verdict
 from app.pipeline.quality.keyframes import RECOVERED
 from reconstruction.mapping.map import Map
@@ -18,8 +19,6 @@ FAIR_ERROR, POOR_ERROR = 0.010, 0.018
 POOR_GUESS = 0.005
 # What is not seen is a guess by its neighbours.
 FAIR_SHARE, POOR_SHARE = 0.5, 0.3
-TOGETHER = 0.75  # of the points that a keyframe shows, with which another has been seen, or it may be on the far side
-COMPARED = 300  # points tell how much is hidden so
 LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be what it is
 # What no longer looks as it did may have slid: along edges, with highlights and shades. Printed paper on bad days has up to
 # 5 %, real faces that speak 16 to 22 %; smooth drawn faces, where half of the points seen are 3 px off, from 50 % on.
@@ -92,18 +91,6 @@ def seen(course: Course, found: Map) -> Iterator[Verdict]:
             return
     if course.lost > len(shares):
         yield Verdict("fair", "the surface is out of sight most of the time; choose its frames with --frames A:B")
-
-
-def at_once(found: Map) -> float:
-    """The share of a solid's points that a usual keyframe might show: of one that turns the far side is hidden.
-
-    Those that some keyframes show together with most of what this one shows; of points missing at random all are.
-    """
-    if found.seen is None or found.rest.kind != "rigid":
-        return 1.0
-    shown = found.seen[:, :: -(-found.seen.shape[1] // COMPARED)].astype(np.float64)
-    beside = shown @ (shown.T @ shown > 0) / shown.sum(axis=1, keepdims=True).clip(1)
-    return float(np.median((beside > TOGETHER).mean(axis=1)))
 
 
 def looks(alike: float) -> Iterator[Verdict]:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.arrays import Flags
 from app.pipeline.quality.course import Course
 from app.pipeline.quality.frames import longest
 from app.pipeline.quality.verdict import verdict
@@ -20,6 +21,14 @@ REST = RestShape("rigid", RigidMotion(100 * np.tile(np.eye(3, 9), 3), np.eye(3)[
 LEFT = Misfit(0.3, 0.3)
 EVIDENCE = Evidence(Misfit(2.0, 2.0), LEFT, 30.0, relief(REST.motion.shape), "solid", LEFT, 0.005, 2.0)
 SOLID = Map(REST, Camera(), evidence=EVIDENCE)
+
+
+def shown(seen: Flags) -> Map:
+    """The solid with keyframes (K, p) that show it so."""
+    count, points = seen.shape
+    shape = np.tile(REST.motion.shape, 2)[:, :points]
+    motion = RigidMotion(shape, np.tile(np.eye(3), (count, 1, 1)), np.ones(count), np.zeros((count, 2)))
+    return replace(SOLID, rest=replace(REST, motion=motion), seen=seen)
 
 
 def course(errors: list[float], shares: float = 1.0) -> Course:
@@ -128,12 +137,12 @@ def test_a_solid_that_half_of_the_keyframes_find_otherwise(factor: float, turn_d
 def test_what_a_solid_hides_of_itself_is_not_held_against_it() -> None:
     """Forty points around it, of which each keyframe shows the nearest sixteen."""
     around, views = np.arange(40) * 9.0, np.arange(60) * 6.0
-    shown = np.abs((around - views[:, None] + 180.0) % 360.0 - 180.0) < 70.0
-    turning, share = replace(SOLID, seen=shown), float(shown.mean())
+    near = np.abs((around - views[:, None] + 180.0) % 360.0 - 180.0) < 70.0
+    turning, share = shown(near), float(near.mean())
     assert 0.35 < share < 0.42
     assert verdict(course([0.001] * 50, share), turning).grade == "good"
     assert "near side" in verdict(course([0.001] * 50, 0.2), turning).reason
-    some = replace(SOLID, seen=np.random.default_rng(0).random(shown.shape) < share)
+    some = shown(np.random.default_rng(0).random(near.shape) < share)
     assert verdict(course([0.001] * 50, share), some).grade == "fair"
 
 
@@ -189,8 +198,8 @@ def test_what_its_views_leave_open(left_open: float, grade: str) -> None:
 @pytest.mark.parametrize(("keyframes", "grade"), [(30, "good"), (60, "fair")])
 def test_points_that_few_keyframes_show_have_no_place(keyframes: int, grade: str) -> None:
     seen = np.ones((keyframes, 27), bool)
-    seen[4:, :2] = False  # four are an eighth of thirty, a fifteenth of sixty
-    assert verdict(course([0.003] * 50), replace(SOLID, seen=seen)).grade == grade
+    seen[4:, :1] = False  # four are an eighth of thirty, a fifteenth of sixty
+    assert verdict(course([0.003] * 50), shown(seen)).grade == grade
 
 
 @pytest.mark.parametrize(("share", "grade"), [(0.9, "good"), (0.4, "fair"), (0.2, "poor")])
@@ -230,6 +239,6 @@ def test_what_it_was_told_to_be_and_is_not(sureness: float, grade: str) -> None:
 def test_points_of_a_solid_that_hardly_any_keyframe_shows() -> None:
     seen = np.ones((30, REST.motion.shape.shape[1]), bool)
     seen[2:, :1] = False
-    assert verdict(course([0.001] * 50), replace(SOLID, seen=np.tile(seen, 2)[:, :50])).grade == "fair"
+    assert verdict(course([0.001] * 50), shown(np.tile(seen, 2)[:, :50])).grade == "fair"
     seen[2] = True
-    assert verdict(course([0.001] * 50), replace(SOLID, seen=seen)).grade == "good"
+    assert verdict(course([0.001] * 50), shown(seen)).grade == "good"
