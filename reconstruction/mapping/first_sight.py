@@ -21,7 +21,7 @@ from reconstruction.settings import Settings
 
 RELIEF = 2.0  # third over fourth singular value: sheets and hearts have less, heads and boxes that open up to 10
 LESS_THAN_A_PLANE = 2.0  # times: shapes of solids that leave more over are 9 to 46 % off, of others 2 to 12
-AS_MUCH = 1.2  # times what a sheet leaves over, at most: solids leave as much, what bends twice
+BEYOND_A_SHEET = 0.13  # of what a plane leaves over, that it may leave beyond a sheet: solids up to 0.1, pages from 0.16 on
 
 
 def first_sight(W: Array, visible: Mask, camera: Camera, settings: Settings) -> Map | None:
@@ -57,15 +57,15 @@ def plain_sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet | Non
 
 
 def plain_solid(W: Array, visible: Mask, camera: Camera, sheet: IsometricSheet | None) -> RestShape | None:
-    """The solid that leaves far less over than a plane, and no more than a sheet."""
+    """The solid that leaves far less over than a plane, and hardly more than a sheet."""
     with suppress(ReconstructionError, np.linalg.LinAlgError):
         some = judging_points(W, visible)
         values = factorize(np.where(visible[:, None], W, 0.0)[:, :, some], visible[:, some]).singular_values
         if values[2] < RELIEF * values[3]:
             return None
         solid, plane = (bundle_adjust(W, visible, camera, refine_focal=False, flat=flat) for flat in (False, True))
-        left_px = float(np.nanmedian(solid.residual_px))
+        left_px, by_plane_px = (float(np.nanmedian(found.residual_px)) for found in (solid, plane))
         by_sheet_px = float(np.nanmedian(np.linalg.norm(W - sheet.warps.images(), axis=1))) if sheet else np.inf
-        if np.nanmedian(plane.residual_px) > LESS_THAN_A_PLANE * left_px and left_px < AS_MUCH * by_sheet_px:
+        if left_px < by_plane_px / LESS_THAN_A_PLANE and left_px < np.hypot(by_sheet_px, BEYOND_A_SHEET * by_plane_px):
             return RestShape("rigid", solid.motion, solid.note)
     return None
