@@ -19,9 +19,13 @@ from reconstruction.mapping.maps import sheet_map
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import Settings
 
-RELIEF = 2.0  # third over fourth singular value: sheets and hearts have less, heads and boxes that open up to 10
+RELIEF = 2.0  # third over fourth singular value: sheets and hearts have less, heads and boxes that turn late 7 to 10
 LESS_THAN_A_PLANE = 2.0  # times: shapes of solids that leave more over are 9 to 46 % off, of others 2 to 12
 BEYOND_A_SHEET = 0.13  # of what a plane leaves over, that it may leave beyond a sheet: solids up to 0.1, pages from 0.16 on
+
+# 95th percentile of what it leaves over, over the median: up to 10 where all of it moves, 30 and more where a lid or a jaw
+# moves by itself, which would then be lost, since points are looked for where the model has them.
+MOVES_ALONE = 15.0
 
 
 def first_sight(W: Array, visible: Mask, camera: Camera, settings: Settings) -> Map | None:
@@ -65,6 +69,8 @@ def plain_solid(W: Array, visible: Mask, camera: Camera, sheet: IsometricSheet |
             return None
         solid, plane = (bundle_adjust(W, visible, camera, refine_focal=False, flat=flat) for flat in (False, True))
         left_px, by_plane_px = (float(np.nanmedian(found.residual_px)) for found in (solid, plane))
+        if np.nanquantile(solid.residual_px, 0.95) > MOVES_ALONE * left_px:
+            return None
         by_sheet_px = float(np.nanmedian(np.linalg.norm(W - sheet.warps.images(), axis=1))) if sheet else np.inf
         if left_px < by_plane_px / LESS_THAN_A_PLANE and left_px < np.hypot(by_sheet_px, BEYOND_A_SHEET * by_plane_px):
             return RestShape("rigid", solid.motion, solid.note)

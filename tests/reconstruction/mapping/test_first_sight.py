@@ -52,6 +52,15 @@ def test_a_solid(degrees: float, swell: float) -> None:
     assert e3d(found.rest.motion.shape[None], shape[None])[0] < 0.1
 
 
+@pytest.mark.parametrize("lift", [0.0, 60.0])
+def test_a_solid_with_a_lid_is_none(lift: float) -> None:
+    rng = np.random.default_rng(2)
+    shapes = np.repeat(relief(rng, 120)[None], 7, axis=0)
+    shapes[1::2, 2, :24] += lift
+    W = seen(shapes, turns(7, 30.0), PERSPECTIVE)[0] + 0.1 * rng.normal(size=(7, 2, 120))
+    assert (first(W, PERSPECTIVE, Settings(rest_shape="solid")) is None) == (lift > 0)
+
+
 def test_what_is_told() -> None:
     W, _ = waving_sheet(np.random.default_rng(0), frames=7)
     assert first(W, settings=Settings(rest_shape="solid")) is None
