@@ -67,10 +67,12 @@ def plain_solid(W: Array, visible: Mask, camera: Camera, sheet: IsometricSheet |
         values = factorize(np.where(visible[:, None], W, 0.0)[:, :, some], visible[:, some]).singular_values
         if values[2] < RELIEF * values[3]:
             return None
-        solid, plane = (bundle_adjust(W, visible, camera, refine_focal=False, flat=flat) for flat in (False, True))
-        left_px, by_plane_px = (float(np.nanmedian(found.residual_px)) for found in (solid, plane))
+        solid = bundle_adjust(W, visible, camera, refine_focal=False)
+        left_px = float(np.nanmedian(solid.residual_px))
         if np.nanquantile(solid.residual_px, 0.95) > MOVES_ALONE * left_px:
             return None
+        plane = bundle_adjust(W, visible, camera, refine_focal=False, flat=True)
+        by_plane_px = float(np.nanmedian(plane.residual_px))
         by_sheet_px = float(np.nanmedian(np.linalg.norm(W - sheet.warps.images(), axis=1))) if sheet else np.inf
         if left_px < by_plane_px / LESS_THAN_A_PLANE and left_px < np.hypot(by_sheet_px, BEYOND_A_SHEET * by_plane_px):
             return RestShape("rigid", solid.motion, solid.note)

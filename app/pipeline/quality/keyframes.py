@@ -29,7 +29,7 @@ WITH_TURN, ALL_WITH_TURN = 0.7, 0.95
 FAIR_OPEN, POOR_OPEN = 0.035, 0.05  # of its size, by which images leave shapes open: poses right, as far off as they are
 AS_LIKELY = 0.1  # of its size, that shapes about as likely are elsewhere: heads have up to 0.07, hearts 0.2
 OFTEN, MOST_RARE = 0.1, 0.03  # of a solid's keyframes must show a point, and share of those that fewer show
-MOST_MISSED = 0.04  # share of points lost where they should show: heads up to 0.015, a jaw 0.08, a lid 0.09
+MOST_MISSED = 0.04  # share of points lost where they should show: heads up to 0.015, a jaw 0.05, a lid 0.08
 OTHERWISE = 0.15  # of its size, that half of the keyframes find a solid elsewhere: those that deform have up to 0.1
 FAIR_BY_FOCAL, POOR_BY_FOCAL = 0.02, 0.05  # of its size, that shapes may be off by a focal length that was looked for
 SURELY = 3.0  # sureness of a sheet that nothing turns: cloth that stretches has up to 2.9, rolled paper 1.6 to 3.6
@@ -148,9 +148,8 @@ def of_solid(found: Map, evidence: Evidence) -> Iterator[Verdict]:
     if rare > MOST_RARE:
         yield Verdict("fair", f"{rare:.0%} of the points are seen too seldom to tell where they are; film them longer")
     if (away := missed(found)) > MOST_MISSED:
-        told = (
-            f"{away:.0%} of the points are mostly lost where they should show: a part that moves by itself, or its texture"
-        )
+        told = f"{away:.0%} of the points are mostly lost where they should show"
+        told += ": a part that moves by itself, or its texture"
         yield Verdict("fair", f"{told}; film it more slowly, from where all parts show")
 
 

@@ -198,7 +198,7 @@ def test_what_its_views_leave_open(left_open: float, grade: str) -> None:
 @pytest.mark.parametrize(("keyframes", "grade"), [(30, "good"), (60, "fair")])
 def test_points_that_few_keyframes_show_have_no_place(keyframes: int, grade: str) -> None:
     seen = np.ones((keyframes, 27), bool)
-    seen[4:, :1] = False  # four are an eighth of thirty, a fifteenth of sixty
+    seen[4:, :2] = False  # four are an eighth of thirty, a fifteenth of sixty
     assert verdict(course([0.003] * 50), shown(seen)).grade == grade
 
 

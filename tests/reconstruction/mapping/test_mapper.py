@@ -112,6 +112,7 @@ def test_the_first_model(latency: int, sheet: bool, poses: int, monkeypatch: pyt
     found = [used.add(image(f), seen, CAMERA, (image(0), seen)) for f in range(FIRST_LOOKS[-1] + 20)]
     first = next(one for one in found if one is not None)
     assert len(first.rest.motion.s) == poses
+    assert (first.seen is None) == (poses == FIRST_LOOKS[-1])
 
 
 def test_where_keyframes_do_not_tell_it_begins_with_a_guess(monkeypatch: pytest.MonkeyPatch) -> None:
