@@ -9,7 +9,7 @@ import rerun as rr
 from app.arrays import Array, Image, Indices
 from app.recording import entities
 from app.recording.stream import Loggable
-from reconstruction.basis.mesh import Mesh
+from reconstruction.basis.mesh import Mesh, vertex_normals
 from reconstruction.basis.modal_basis import ModalBasis
 
 AMPLITUDE = 0.18  # largest displacement, as a share of the rest shape's length
@@ -90,11 +90,5 @@ def colored(values: Array, light: Array) -> Image:
 
 def brightness(shape: Array, faces: Indices, view: View) -> Array:
     """Light (p,) from 0 to 1 on the vertices of a shape (3, p), the same on both sides of the surface."""
-    a, b, c = (shape[:, faces[:, k]] for k in range(3))
-    normals = np.cross((b - a).T, (c - a).T)  # as long as the triangle is large
-    at_vertices = np.zeros((shape.shape[1], 3))
-    for k in range(3):
-        np.add.at(at_vertices, faces[:, k], normals)
-    at_vertices /= np.linalg.norm(at_vertices, axis=1, keepdims=True).clip(1e-12)
     light = view.axes.T @ (LIGHT / np.linalg.norm(LIGHT))
-    return np.asarray(0.42 + 0.58 * np.abs(at_vertices @ light))
+    return np.asarray(0.42 + 0.58 * np.abs(vertex_normals(shape.T, faces) @ light))

@@ -170,6 +170,17 @@ def smallest_angle(points: Array, faces: Indices) -> Array:
     return np.arccos(np.clip((b * b + c * c - a * a) / np.maximum(2 * b * c, 1e-300), -1, 1))
 
 
+def vertex_normals(vertices: Array, faces: Indices) -> Array:
+    """Unit normals (p, 3) of vertices (p, 3), of the triangles (m, 3) around each by their areas; 0 where there is none."""
+    corners = vertices[faces]
+    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    summed = np.zeros_like(vertices)
+    for corner in range(3):
+        np.add.at(summed, faces[:, corner], area)
+    length = np.linalg.norm(summed, axis=1, keepdims=True)
+    return np.asarray(summed / np.where(length > 0, length, 1.0))
+
+
 def farthest_points(points: Array, count: int) -> Indices:
     """Indices of `count` well-spread points of (p, d), farthest-first, starting at the one farthest from the centroid."""
     distance = np.linalg.norm(points - points.mean(axis=0), axis=1)

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from app.arrays import Array, Indices
 from app.files.scenes.gltf_buffer import Buffer
+from reconstruction.basis.mesh import vertex_normals
 from reconstruction.basis.modal_basis import ROW_NAMES, ModalBasis
 from reconstruction.camera import rotation_from_quaternion
 
@@ -193,14 +194,9 @@ def textured_mesh(
 
 
 def normals(vertices: Array, faces: Indices) -> Array:
-    """Unit normals (p, 3) of vertices, of the triangles around each by their areas; where there is none, any."""
-    corners = vertices[faces]
-    area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    summed = np.zeros_like(vertices)
-    for k in range(3):
-        np.add.at(summed, faces[:, k], area)
-    length = np.linalg.norm(summed, axis=1, keepdims=True)
-    return np.where(length > 0, summed / np.where(length > 0, length, 1.0), [0.0, 0.0, -1.0])
+    """Unit normals (p, 3) of vertices; where there is no triangle, any."""
+    found = vertex_normals(vertices, faces)
+    return np.where(found.any(axis=1, keepdims=True), found, [0.0, 0.0, -1.0])
 
 
 def animation(moving: MovingMesh, buffer: Buffer, weights: Array) -> gltf.Animation:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from app.arrays import Flags, Indices
+from reconstruction.basis.mesh import vertex_normals
 from reconstruction.basis.model import triangulated
 from reconstruction.mapping.map import Map
 from reconstruction.mapping.solid.bundle import seen_by
@@ -42,11 +43,7 @@ def missed(found: Map) -> float:
 def shows(found: Map, faces: Indices) -> Flags:
     """Which points (K, p) of triangles (m, 3) the rest shape turns to the camera in its keyframes."""
     motion, camera = found.rest.motion, found.camera
-    a, b, c = (motion.shape[:, faces[:, corner]] for corner in range(3))
-    across, normals = np.cross(b - a, c - a, axis=0), np.zeros_like(motion.shape)
-    for corner in range(3):
-        np.add.at(normals.T, faces[:, corner], across.T)
+    normals = vertex_normals(motion.shape.T, faces).T
     rays = np.insert((seen_by(camera, motion) - camera.center_px[:, None]) / camera.focal_px, 2, 1.0, axis=1)
     turned = ((motion.R @ normals) * rays).sum(axis=1)
-    cosine = turned / (np.linalg.norm(normals, axis=0) * np.linalg.norm(rays, axis=1)).clip(np.finfo(float).tiny)
-    return np.asarray(cosine * np.sign(turned[found.seen].sum()) > GRAZING)
+    return np.asarray(turned / np.linalg.norm(rays, axis=1) * np.sign(turned[found.seen].sum()) > GRAZING)
