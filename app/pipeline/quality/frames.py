@@ -23,6 +23,8 @@ LIKE_A_SOLID = 1.5  # times what a sheet leaves over, up to which a solid may be
 # What no longer looks as it did may have slid: along edges, with highlights and shades. Printed paper on bad days has up to
 # 5 %, real faces that speak 16 to 22 %; smooth drawn faces, where half of the points seen are 3 px off, from 50 % on.
 FAIR_UNLIKE, POOR_UNLIKE = 0.2, 0.45
+# Points that do not move with the rest: of what is reconstructed well, up to 0.6 %, gross errors or not.
+MOST_ASTRAY = 0.02
 LASTING = 0.1  # of the frames, in one piece: so long a bad stretch is told
 
 
@@ -76,7 +78,7 @@ def remedy(found: Map) -> str:
 
 
 def seen(course: Course, found: Map) -> Iterator[Verdict]:
-    """What the share of points seen says, of those that may be seen at once."""
+    """What the share of points seen says, of those that may be seen at once, and what does not move with the rest."""
     possible = at_once(found)
     shares = np.asarray(course.shares) / possible
     points = "points" if possible == 1 else "points on the near side"
@@ -89,6 +91,9 @@ def seen(course: Course, found: Map) -> Iterator[Verdict]:
             told = f"{stretch}less than {limit:.0%} of the {points} are seen; leave such frames out with --frames A:B"
             yield Verdict(grade, told)
             return
+    if course.astray > MOST_ASTRAY:
+        told = f"{course.astray:.0%} of the points do not move with it: a part that moves by itself, or background"
+        yield Verdict("fair", f"{told}; draw the region tightly: modeshape pick, --roi or --mask")
     if course.lost > len(shares):
         yield Verdict("fair", "the surface is out of sight most of the time; choose its frames with --frames A:B")
 

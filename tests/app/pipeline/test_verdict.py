@@ -214,6 +214,12 @@ def test_what_looks_otherwise_than_it_did_may_have_slid(alike: float, grade: str
     assert (f"{1 - alike:.0%} of what is seen looks otherwise" in said.reason) == (grade != "good")
 
 
+def test_points_that_do_not_move_with_the_rest() -> None:
+    said = verdict(replace(course([0.003] * 50), seen=np.full(100, 50), far=np.repeat([25, 5], [5, 95])), SOLID)
+    assert said.grade == "fair"
+    assert "5% of the points do not move with it" in said.reason
+
+
 def test_without_a_shape() -> None:
     assert verdict(Course(), None).grade == "poor"
 

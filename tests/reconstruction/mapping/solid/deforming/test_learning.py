@@ -13,7 +13,7 @@ from reconstruction.mapping.mapper import on_the_way
 from reconstruction.mapping.maps import map_of
 from reconstruction.mapping.solid.deforming import learned_map, rounds
 from reconstruction.mapping.solid.deforming.attempt import Shown, begun
-from reconstruction.mapping.solid.deforming.learned_map import with_deformations
+from reconstruction.mapping.solid.deforming.learned_map import much_better, with_deformations
 from reconstruction.mapping.solid.deforming.learning import POINTS, learned
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import Settings
@@ -86,6 +86,16 @@ def test_rigid_things_learn_nothing() -> None:
     _, W, visible = keyframes(0.0)
     found = mapped(W, visible, PERSPECTIVE)
     assert with_deformations(found, Settings(), W, visible, FRAMES) is found
+
+
+@pytest.mark.parametrize(("part", "deforms"), [(0.05, True), (0.01, False)])
+def test_a_part_that_moves_by_itself_is_predicted_but_for_a_few_points(part: float, deforms: bool) -> None:
+    """However far off those are; and a few that are put right where all drift are no part."""
+    then, now = np.full((2, 1000), 0.001)
+    then[: int(1000 * part)], now[: int(1000 * part)] = 0.15, 0.02
+    then[: int(200 * part)] = now[: int(200 * part)] = 0.3
+    assert much_better(now, then) == deforms
+    assert not much_better(0.9 * then, then)
 
 
 @pytest.mark.parametrize(
