@@ -10,8 +10,6 @@ from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RestShape
 from reconstruction.camera import Camera
 from reconstruction.mapping.first.bootstrap import first_map
-from reconstruction.mapping.first.evidence import judging_points
-from reconstruction.mapping.first.factorization import factorize
 from reconstruction.mapping.isometric.adjustment import KEPT, mirrored, smooth_sheet
 from reconstruction.mapping.isometric.sheet import IsometricSheet
 from reconstruction.mapping.map import Map
@@ -19,13 +17,8 @@ from reconstruction.mapping.maps import sheet_map
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.settings import Settings
 
-RELIEF = 2.0  # third over fourth singular value: sheets and hearts have less, heads and boxes that turn late 7 to 10
 LESS_THAN_A_PLANE = 2.0  # times: shapes of solids that leave more over are 9 to 46 % off, of others 2 to 12
 BEYOND_A_SHEET = 0.13  # of what a plane leaves over, that it may leave beyond a sheet: solids up to 0.1, pages from 0.16 on
-
-# 95th percentile of what it leaves over, over the median: up to 10 where all of it moves, 30 and more where a lid or a jaw
-# moves by itself, which would then be lost, since points are looked for where the model has them.
-MOVES_ALONE = 15.0
 
 
 def first_sight(W: Array, visible: Mask, camera: Camera, settings: Settings) -> Map | None:
@@ -63,14 +56,8 @@ def plain_sheet(W: Array, visible: Mask, camera: Camera) -> IsometricSheet | Non
 def plain_solid(W: Array, visible: Mask, camera: Camera, sheet: IsometricSheet | None) -> RestShape | None:
     """The solid that leaves far less over than a plane, and hardly more than a sheet."""
     with suppress(ReconstructionError, np.linalg.LinAlgError):
-        some = judging_points(W, visible)
-        values = factorize(np.where(visible[:, None], W, 0.0)[:, :, some], visible[:, some]).singular_values
-        if values[2] < RELIEF * values[3]:
-            return None
         solid = bundle_adjust(W, visible, camera, refine_focal=False)
         left_px = float(np.nanmedian(solid.residual_px))
-        if np.nanquantile(solid.residual_px, 0.95) > MOVES_ALONE * left_px:
-            return None
         plane = bundle_adjust(W, visible, camera, refine_focal=False, flat=True)
         by_plane_px = float(np.nanmedian(plane.residual_px))
         by_sheet_px = float(np.nanmedian(np.linalg.norm(W - sheet.warps.images(), axis=1))) if sheet else np.inf
