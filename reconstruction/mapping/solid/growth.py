@@ -10,10 +10,11 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.solid.adjustment import Adjustment
 from reconstruction.mapping.solid.building import Build
 from reconstruction.mapping.solid.bundle import Bundle
-from reconstruction.mapping.solid.placing import dome, well_spread
+from reconstruction.mapping.solid.placing import dome, hollow, well_spread
 from reconstruction.mapping.solid.views import Likeness, building_order, completed
 
 REPOSINGS, ENOUGH = 5, 0.999  # rounds of posing views anew, while they lower the energy to less than so much of it
+FROM_INSIDE = 1.7  # times the energy of what is hollow: rigid things leave 2 to 20 times as much over the wrong way round
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,8 @@ class Growth:
     ) -> tuple["Growth", Bundle, float]:
         """Itself, the likeliest bundle and its energy, px²: grown on a dome, all views at once, or posed by a known shape.
 
+        Things are seen from outside: where views hardly tell, the middle is nearer than the rim.
+
         Args:
             known: a shape (3, p) that it may be.
             whole: whether to start from all views at once, too.
@@ -66,18 +69,24 @@ class Growth:
         both_ways = build.factorized() if whole else []
         starts = [*both_ways, self.grown]
         starts += [] if known is None or not hidden else [build.posed(known[:, self.some])]
-        found = [build.settled(one, refine=refine) for one in starts]
+        found = [self._settled(one, refine=refine) for one in starts]
         k = int(np.argmin([energy for _, energy in found]))
         best, energy = found[k]
         if build.kappa and k >= len(both_ways):
-            other, its_energy = build.settled(best.reversed(), refine=refine)
+            other, its_energy = self._settled(best.reversed(), refine=refine)
             best, energy = (other, its_energy) if its_energy < energy else (best, energy)
         for _ in range(REPOSINGS if hidden else 0):
-            other, its_energy = build.settled(build.reposed(best), refine=refine)
+            other, its_energy = self._settled(build.reposed(best), refine=refine)
             if not its_energy < ENOUGH * energy:
                 break
             best, energy = other, its_energy
         return self, best, energy * self.unit**2
+
+    def _settled(self, start: Bundle, *, refine: bool) -> tuple[Bundle, float]:
+        """A start settled, and its energy, more if it is hollow."""
+        bundle, energy = self.chosen.settled(start, refine=refine)
+        inside = bundle.kappa and not self.build.flat and hollow(bundle, self.chosen.h[0] > 0)
+        return bundle, FROM_INSIDE * energy if inside else energy
 
 
 def growth_from(W: Array, visible: Mask, camera: Camera, alike: Likeness, view: int, *, flat: bool) -> Growth:

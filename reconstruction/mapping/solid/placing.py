@@ -40,6 +40,13 @@ def dome(first: Array, kappa: float, *, flat: bool) -> RigidMotion:
     return RigidMotion(np.concatenate([xy - t[:, None], z[None]]), np.eye(3)[None], np.ones(1), t[None])
 
 
+def hollow(bundle: Bundle, seen: Mask) -> bool:
+    """Whether, of points (p,) seen in the first view, those in the middle are farther away than those around."""
+    x, y, z = bundle.placed()[0][:, seen] - bundle.placed()[0][:, seen].mean(axis=1, keepdims=True)
+    terms = np.stack([x * x + y * y, x, y, np.ones_like(x)])
+    return bool(np.linalg.lstsq(terms.T, z, rcond=None)[0][0] < 0)
+
+
 def resection(shape: Array, image: Array, rounds: int = 1) -> tuple[Array, float]:
     """Rotation (3, 3) and scale with which a shape (3, n) looks most like an image (2, n), as if there were no perspective.
 

@@ -69,6 +69,19 @@ def test_perspective_tells_which_way_it_bulges():
     assert np.corrcoef(solid.shape[2], shape[2])[0, 1] > 0.99
 
 
+@pytest.mark.parametrize("seed", [0, 2])
+@pytest.mark.parametrize(("side", "swell"), [(1, 0.0), (-1, 0.0), (1, 0.1)], ids=["dome", "dish", "swelling dome"])
+def test_things_are_seen_from_outside_where_views_hardly_tell(seed, side, swell):
+    rng = np.random.default_rng(seed)
+    x, y, _ = flat(rng, 120)
+    shape = np.stack([x, y, side * (x * x + y * y) / 400])
+    change = swell * rng.normal(size=(12, 3, 1)) * np.sin(x / 20 + rng.uniform(0, 6, (12, 1, 1)))
+    R = turns(12, 6.0)
+    W = seen(shape * (1 + change), R, PERSPECTIVE)[0] + 0.2 * rng.normal(size=(12, 2, 120))
+    found = bundle_adjust(W, np.ones((12, 120), bool), PERSPECTIVE, refine_focal=False)
+    assert np.corrcoef((found.motion.R[0] @ found.shape)[2], shape[2])[0, 1] > 0.5
+
+
 def test_focal_length_is_refined_where_the_views_hold_it():
     shape, W, visible = views(np.random.default_rng(5), PERSPECTIVE, degrees=35)
     rough = replace(PERSPECTIVE, focal_px=1.4 * PERSPECTIVE.focal_px)
