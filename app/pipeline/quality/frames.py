@@ -78,7 +78,7 @@ def remedy(found: Map) -> str:
 
 
 def seen(course: Course, found: Map) -> Iterator[Verdict]:
-    """What the share of points seen says, of those that may be seen at once, and what does not move with the rest."""
+    """What the share of points seen says, of those that may be seen at once."""
     possible = at_once(found)
     shares = np.asarray(course.shares) / possible
     points = "points" if possible == 1 else "points on the near side"
@@ -91,11 +91,15 @@ def seen(course: Course, found: Map) -> Iterator[Verdict]:
             told = f"{stretch}less than {limit:.0%} of the {points} are seen; leave such frames out with --frames A:B"
             yield Verdict(grade, told)
             return
+    if course.lost > len(shares):
+        yield Verdict("fair", "the surface is out of sight most of the time; choose its frames with --frames A:B")
+
+
+def astray(course: Course) -> Iterator[Verdict]:
+    """What the share of points says that do not move with the rest."""
     if course.astray > MOST_ASTRAY:
         told = f"{course.astray:.0%} of the points do not move with it: a part that moves by itself, or background"
         yield Verdict("fair", f"{told}; draw the region tightly: modeshape pick, --roi or --mask")
-    if course.lost > len(shares):
-        yield Verdict("fair", "the surface is out of sight most of the time; choose its frames with --frames A:B")
 
 
 def looks(alike: float) -> Iterator[Verdict]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from app.pipeline.quality.course import Course
 from app.pipeline.quality.finding import GRADES, Grade, Verdict
-from app.pipeline.quality.frames import errors, looks, seen
+from app.pipeline.quality.frames import astray, errors, looks, seen
 from app.pipeline.quality.keyframes import RECOVERED, evidence
 from reconstruction.mapping.map import Map
 
@@ -23,7 +23,7 @@ def verdict(course: Course, found: Map | None, bits_per_px: float | None = None,
     """
     if found is None or np.isnan(np.asarray(course.errors)).all():
         return Verdict("poor", "there is no shape; the video is too short, or the surface has too little texture")
-    findings = [*errors(course, found), *seen(course, found), *looks(alike)]
+    findings = [*errors(course, found), *seen(course, found), *astray(course), *looks(alike)]
     if bits_per_px is not None:
         told = f"compressed to {bits_per_px:.2g} bits a pixel, texture is made up between key pictures; export it with more"
         findings.append(Verdict("poor", told))
