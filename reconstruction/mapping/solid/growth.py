@@ -10,11 +10,11 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.solid.adjustment import Adjustment
 from reconstruction.mapping.solid.building import Build
 from reconstruction.mapping.solid.bundle import Bundle
-from reconstruction.mapping.solid.placing import dome, hollow, well_spread
+from reconstruction.mapping.solid.placing import alike_beside, dome, hollow, well_spread
 from reconstruction.mapping.solid.views import Likeness, building_order, completed
 
 REPOSINGS, ENOUGH = 5, 0.999  # rounds of posing views anew, while they lower the energy to less than so much of it
-FROM_INSIDE = 1.7  # times the energy of what is hollow: rigid things leave 2 to 20 times as much over the wrong way round
+FROM_INSIDE = 1.0  # times more of the energy of a bowl, as far as what it leaves over is no noise but deformation
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,12 @@ class Growth:
 
     def _settled(self, start: Bundle, *, refine: bool) -> tuple[Bundle, float]:
         """A start settled, and its energy, more if it is hollow."""
-        bundle, energy = self.chosen.settled(start, refine=refine)
-        inside = bundle.kappa and not self.build.flat and hollow(bundle, self.chosen.h[0] > 0)
-        return bundle, FROM_INSIDE * energy if inside else energy
+        build = self.chosen
+        bundle, energy = build.settled(start, refine=refine)
+        if bundle.kappa and not build.flat:
+            alike = alike_beside(bundle.image() - build.W, build.h > 0, build.first)
+            energy *= 1 + FROM_INSIDE * hollow(bundle, build.h[0] > 0) * alike
+        return bundle, energy
 
 
 def growth_from(W: Array, visible: Mask, camera: Camera, alike: Likeness, view: int, *, flat: bool) -> Growth:
