@@ -20,6 +20,7 @@ from reconstruction.mapping.first.factorization import affine_structure, factori
 from reconstruction.mapping.first.rigid import bundle_adjust
 from reconstruction.mapping.solid import solid
 from reconstruction.mapping.solid.bundle import Bundle
+from reconstruction.mapping.solid.hollow import disbelief
 from reconstruction.mapping.solid.placing import beside_others
 
 VIEWS = 16  # of the first frames are enough for a plane
@@ -45,11 +46,18 @@ def rigid(W: Array, visible: Mask, camera: Camera) -> RestShape:
     start = factorize_often_seen(W, visible)
     start = replace(start, t=start.t - camera.center_px)
     starts = [start, start.mirrored()] if camera.perspective else [start]
-    motion, rms = min((bundle_adjust(W, visible, s, camera) for s in starts), key=lambda found: found[1])
+    found = (bundle_adjust(W, visible, s, camera) for s in starts)
+    motion, rms = min(found, key=lambda one: counted(W, visible, camera, *one))
     motion = motion.in_first_frame()
     turn = view_turn_degrees(motion.R)
     note = f"rigid shape from {len(W)} frames, turned {turn:.0f}°, reprojection error {rms:.2f} px"
     return RestShape("rigid", motion, note)
+
+
+def counted(W: Array, visible: Mask, camera: Camera, motion: RigidMotion, rms: float) -> float:
+    """The mean square px² left over, more if the shape is hollow: things are seen from outside."""
+    bundle = Bundle(motion, 1 / camera.focal_px)
+    return rms**2 * disbelief(bundle, W - camera.center_px[:, None], visible, first_image(W, visible))
 
 
 def factorize_often_seen(W: Array, visible: Mask) -> RigidMotion:

@@ -10,12 +10,11 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.solid.adjustment import Adjustment
 from reconstruction.mapping.solid.building import Build
 from reconstruction.mapping.solid.bundle import Bundle
-from reconstruction.mapping.solid.hollow import alike_beside, hollow
+from reconstruction.mapping.solid.hollow import disbelief
 from reconstruction.mapping.solid.placing import dome, well_spread
 from reconstruction.mapping.solid.views import Likeness, building_order, completed
 
 REPOSINGS, ENOUGH = 5, 0.999  # rounds of posing views anew, while they lower the energy to less than so much of it
-FROM_INSIDE = 1.0  # times more of the energy of a bowl, as far as what it leaves over is no noise but deformation
 
 
 @dataclass(frozen=True)
@@ -87,10 +86,7 @@ class Growth:
         """A start settled, and its energy, more if it is hollow."""
         build = self.chosen
         bundle, energy = build.settled(start, refine=refine)
-        bowl = hollow(bundle, build.h[0] > 0) if bundle.kappa and not build.flat else 0.0
-        if bowl:
-            energy *= 1 + FROM_INSIDE * bowl * alike_beside(bundle.image() - build.W, build.h > 0, build.first)
-        return bundle, energy
+        return bundle, energy if build.flat else energy * disbelief(bundle, build.W, build.h > 0, build.first)
 
 
 def growth_from(W: Array, visible: Mask, camera: Camera, alike: Likeness, view: int, *, flat: bool) -> Growth:

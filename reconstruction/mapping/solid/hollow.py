@@ -6,6 +6,21 @@ from scipy.spatial import cKDTree
 from reconstruction.arrays import Array, Mask
 from reconstruction.mapping.solid.bundle import Bundle
 
+FROM_INSIDE = 1.0  # times more of the energy of a bowl, as far as what it leaves over is no noise but deformation
+
+
+def disbelief(bundle: Bundle, W: Array, seen: Mask, places: Array) -> float:
+    """How many times its energy is to count, of views W (K, 2, p) with visibility (K, p): 1 if it is no bowl, or fits.
+
+    Args:
+        bundle: what explains them.
+        W: relative to the principal point, as `bundle.image()`; anything where not visible.
+        seen: (K, p).
+        places: where points (2, p) are beside each other.
+    """
+    bowl = hollow(bundle, seen[0]) if bundle.kappa else 0.0
+    return 1 + FROM_INSIDE * bowl * alike_beside(bundle.image() - W, seen, places) if bowl else 1.0
+
 
 def hollow(bundle: Bundle, seen: Mask) -> float:
     """How much of a bowl points (p,) seen in the first view are: how far their depth off a plane goes with one's, up to 1.

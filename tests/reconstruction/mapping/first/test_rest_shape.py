@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
+from app.synthetic.scene import scene
+from app.synthetic.tracks import tracks
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.mapping.first import rest_shape
@@ -53,6 +55,26 @@ def test_perspective_tells_a_shape_from_its_mirror_image(rng: np.random.Generato
     first = turns(FRAMES)[0] @ shape
     depth = (found.R[0] @ found.shape)[2]
     assert np.corrcoef(depth, first[2])[0, 1] > 0.9
+
+
+@pytest.mark.parametrize("seed", [8, 9])
+def test_a_head_that_talks_is_not_hollow(seed: int) -> None:
+    """By the error alone these are: 2.2 against 2.6 px, 2.8 against 3.2."""
+    given = tracks(scene("talking-head", seed, frames=360))
+    W, visible = given.W[:60], given.visible[:60]
+    found = rest_shape.rigid(W, visible, Camera(given.K[0, 0], given.K[:2, 2])).motion.in_first_frame()
+    seen = visible.any(axis=0)
+    assert np.corrcoef(found.shape[2, seen], given.S_gt[0, 2, seen])[0, 1] > 0.3
+
+
+def test_the_mould_of_a_head_is_hollow() -> None:
+    """Of what is rigid the views tell."""
+    given = tracks(scene("head", 1, frames=360))
+    S = given.S_gt[:60] * [[1], [1], [-1]] + [[0], [0], [4.4]]
+    camera = Camera(given.K[0, 0], given.K[:2, 2])
+    W = camera.project(S) + np.random.default_rng(0).normal(0, 0.5, (60, 2, S.shape[2]))
+    found = rest_shape.rigid(W, np.ones((60, S.shape[2]), bool), camera).motion.in_first_frame()
+    assert np.corrcoef(found.shape[2], S[0, 2])[0, 1] > 0.9
 
 
 @settings(max_examples=8)
