@@ -74,7 +74,7 @@ class Map:
         """
         found: list[Foreseen | None] = []
         for W, visible in frames:
-            if self.sheet is None or visible.sum() < FEWEST_POINTS:
+            if self.sheet is None or (visible & self.sheet.warps.placed).sum() < FEWEST_POINTS:
                 found.append(None)
             else:
                 last = shape_in(self.sheet, np.where(visible, W, 0.0), visible, last)

@@ -148,7 +148,7 @@ def decide(rigid: Rigid, sheet: Misfit, stretch: float, told_px: float = np.nan,
         best = "solid"
     stiff_px = min(flat.edges_px, solid.edges_px)
     rigid_px, least = solid.edges_px if best == "solid" else stiff_px, SHEET_FREEDOM
-    explained = max(0.0, 1 - (solid.edges_px / max(flat.edges_px, 1e-300)) ** 2)  # by relief, of what a plane leaves
+    explained = 1 - min(1.0, solid.edges_px / max(flat.edges_px, 1e-300)) ** 2  # by relief, of what a plane leaves
     most = FEW_SIDES_FREEDOM if rigid.turn_degrees < FEW_SIDES_DEG else MOST_FREEDOM
     if not rigid.proven:  # all of its stretching speaks against a sheet, too
         rigid_px, least, explained, most = min(flat.whole_px, solid.whole_px), 1.0, 1.0, MOST_FREEDOM

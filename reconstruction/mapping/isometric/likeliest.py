@@ -49,7 +49,8 @@ def likeliest(found: IsometricSheet) -> IsometricSheet:
         C[k] = fitting[k].shapes[chosen[k]]
         return bool(chosen[k] != before)
 
-    order = most_alike_first(found.nodes.images.reshape(len(C), -1), int((C[:, 2] @ few.T).std(axis=1).argmax()))
+    looks = found.nodes.images - found.nodes.images.mean(axis=2, keepdims=True)
+    order = most_alike_first(looks.reshape(len(C), -1), int((C[:, 2] @ few.T).std(axis=1).argmax()))
     for n, k in enumerate(order[1:], 1):
         choose(k, order[:n])
     for _ in range(ROUNDS):

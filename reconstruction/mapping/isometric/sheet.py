@@ -194,7 +194,7 @@ class IsometricSheet:
         return np.asarray(np.sqrt(off**2 @ self.edge_weights / max(float(self.edge_weights.sum()), 1e-12)))
 
     def cost(self, C: Array, W: Array, weights: Array) -> Array:
-        """What bundling lowers (F,); C (F, 3, R), W (2, p) px and weights (p,) of the frame seen in all."""
+        """How badly shapes C (F, 3, R) fit (F,), all points, of which bundling takes few, W (2, p) px with weights (p,)."""
         off = self.residuals(C @ self.functions.T, W)
         total = float(self.edge_weights.sum())
         return np.asarray(
@@ -207,8 +207,7 @@ class IsometricSheet:
         """The same with points at other places (2, p) of the reference image."""
         warps, values = self.warps.moved(places), np.full_like(self.values, np.nan)
         values[warps.placed] = self.field.at(places[:, warps.placed])
-        nodes = replace(self.nodes, reference=places[:, self.nodes.points])
-        nodes = replace(nodes, middles=warps.images_at(nodes.halfway))
+        nodes = replace(self.nodes, reference=places[:, self.nodes.points])  # its middles come with the shapes
         return replace(self, warps=warps, values=values, nodes=nodes)
 
     def with_shapes(self, shapes: Array) -> "IsometricSheet":

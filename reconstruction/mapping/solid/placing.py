@@ -40,7 +40,7 @@ def dome(first: Array, kappa: float, *, flat: bool) -> RigidMotion:
     return RigidMotion(np.concatenate([xy - t[:, None], z[None]]), np.eye(3)[None], np.ones(1), t[None])
 
 
-def resection(shape: Array, image: Array, rounds: int = 1) -> tuple[Array, float]:
+def resection(shape: Array, image: Array, rounds: int) -> tuple[Array, float]:
     """Rotation (3, 3) and scale with which a shape (3, n) looks most like an image (2, n), as if there were no perspective.
 
     With more rounds, points that are far off count for little.
@@ -93,12 +93,10 @@ def located(W: Array, h: Array, bundle: Bundle, points: Mask, *, flat: bool) -> 
     return Bundle(replace(m, shape=shape), bundle.kappa)
 
 
-def with_others(W: Array, h: Array, bundle: Bundle, some: Indices, unseen: Array) -> Bundle:
-    """A bundle of `some` of the points with all of them, the others where `located` finds them.
-
-    Arguments as for that; where no view sees one, it is where a shape (3, p) has it.
-    """
-    shape, others = unseen.copy(), np.ones(unseen.shape[1], np.bool_)
+def with_others(W: Array, h: Array, bundle: Bundle, some: Indices) -> Bundle:
+    """A bundle of `some` of the points with all of them, the others where `located` finds them; arguments as for that."""
+    p = h.shape[1]
+    shape, others = np.zeros((3, p)), np.ones(p, np.bool_)
     shape[:, some] = bundle.motion.shape
     others[some] = False
     whole = Bundle(replace(bundle.motion, shape=shape), bundle.kappa)

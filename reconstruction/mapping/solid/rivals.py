@@ -9,11 +9,11 @@ from reconstruction.camera import Camera
 from reconstruction.mapping.solid.placing import FEWEST_VIEWS
 from reconstruction.mapping.solid.seen_again import image_in
 from reconstruction.mapping.solid.solid import Solid, bundle_adjust
+from reconstruction.window.robust import RAYLEIGH_MEDIAN
 
 # A solid that turns less is not proven, unless its relief explains so many times what neighbours share of what it leaves
 # over, in squares: what deforms seems to turn, too.
 HARDLY_TURNED, EXPLAINED = 25.0, 5.0
-SIGMAS = 1.1774  # median of a Rayleigh distribution
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,9 @@ class Rigid:
 
 
 def rigid_by(made: tuple[Array, Mask], tested: tuple[Array, Mask], camera: Camera, edges: Indices) -> Rigid:
-    """A plane and a solid made from some keyframes, on others."""
+    """A plane and a solid made from some keyframes, on others that show any of the points."""
+    shown = tested[1].any(axis=1)
+    tested = tested[0][shown], tested[1][shown]
     solid, flat = (bundle_adjust(*made, camera, refine_focal=False, flat=flat) for flat in (False, True))
     left = [rigid_misfit(model, *tested, camera, edges) for model in (flat, solid)]
     shape = np.where(made[1].sum(axis=0) < FEWEST_VIEWS, np.nan, solid.shape)
@@ -68,8 +70,8 @@ def rigid_misfit(model: Solid, W: Array, visible: Mask, camera: Camera, edges: I
     i, j = edges.T
     off = np.where(visible[:, None], image_in(model, W, visible, camera) - W, 0.0)
     seen = visible[:, i] & visible[:, j]
-    between = np.median(np.linalg.norm(off[:, :, i] - off[:, :, j], axis=1)[seen]) / SIGMAS / np.sqrt(2)
-    return Misfit(float(between), float(np.median(np.linalg.norm(off, axis=1)[visible]) / SIGMAS))
+    between = np.median(np.linalg.norm(off[:, :, i] - off[:, :, j], axis=1)[seen]) / RAYLEIGH_MEDIAN / np.sqrt(2)
+    return Misfit(float(between), float(np.median(np.linalg.norm(off, axis=1)[visible]) / RAYLEIGH_MEDIAN))
 
 
 def both(one: Rigid, other: Rigid) -> Rigid:

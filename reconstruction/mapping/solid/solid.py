@@ -49,11 +49,6 @@ class Solid:
         """(3, p)."""
         return self.motion.shape
 
-    @property
-    def frame_residuals_px(self) -> Array:
-        """(K,) median residual of each keyframe."""
-        return np.asarray(np.nanmedian(self.residual_px, axis=1))
-
 
 def bundle_adjust(
     W: Array,
@@ -72,7 +67,8 @@ def bundle_adjust(
         camera: its focal length may be a guess.
         refine_focal: whether the views may change it.
         flat: whether the shape is a plane, whatever the views say.
-        known: a shape (3, p) of any size that it may be, to start from as well.
+        known: a shape (3, p) of any size that it may be: where points are that no view shows; if its far side is hidden, a
+            start, too.
 
     Raises:
         ReconstructionError: fewer than 3 keyframes, or 6 points seen often enough.

@@ -179,10 +179,3 @@ def off_neighbours_plane(points: Array, edges: Indices, sound: Mask) -> tuple[sp
     share = (height[i] * rows.T).sum(axis=1) * w
     plane = sp.coo_array((share, (i, j)), shape=(p, p))
     return (sp.diags_array((~alone).astype(np.float64)) - plane).tocsr(), close
-
-
-def worst_spike(shape: Array) -> float:
-    """Largest distance of a vertex (3, p) from its neighbours' plane over the shape's width."""
-    shape = principal_axes(shape).T @ shape
-    D, _ = off_neighbours_plane(shape[:2], triangulate(shape[:2].T).edges, np.ones(shape.shape[1], bool))
-    return float(np.abs(D @ shape[2]).max() / np.ptp(shape[:2], axis=1).mean())

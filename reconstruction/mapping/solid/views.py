@@ -66,11 +66,13 @@ def first_views(alike: Likeness, visible: Mask) -> list[int]:
         alike: how alike the views are.
         visible: (K, p).
     """
-    apart = alike.distance + alike.distance.T
-    middle = int(np.median(apart, axis=1).argmin())
+    count = visible.sum(axis=1)
+    telling = count >= np.median(count) / 2  # a few points agree by chance
+    apart = np.median(alike.distance + alike.distance.T, axis=1)
+    middle = int(np.where(telling, apart, np.inf).argmin())
     if np.isnan(alike.b.real).mean() < HIDDEN:
         return [middle]
-    order, count = building_order(alike, middle)[0][1:], visible.sum(axis=1)
+    order = building_order(alike, middle)[0][1:]
     order = order[count[order] >= np.median(count)]
     return [middle, *(int(order[k]) for k in np.unique(np.linspace(0, len(order) - 1, ALL_AROUND - 1).astype(int)))]
 

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from reconstruction import ReconstructionError
 from reconstruction.camera import Camera
 from reconstruction.mapping.selection import decide, select, spread_edges, spread_points
-from reconstruction.mapping.solid.rivals import Misfit, Rigid
+from reconstruction.mapping.solid.rivals import Misfit, Rigid, rigid_by
 from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, SEEDS, flat, relief, rolled, seen, turns
 
 K, P = 16, 100
@@ -33,6 +33,19 @@ def test_a_solid_is_told(rng):
     assert evidence.sureness > 1.2
     assert evidence.solid.edges_px == pytest.approx(0.2, rel=0.3)
     assert "solid" in evidence.note
+
+
+@given(SEEDS)
+@settings(max_examples=3, deadline=None)
+def test_a_keyframe_without_the_points_compared_tells_nothing(rng):
+    W, visible, _ = keyframes(rng, np.repeat(relief(rng, P)[None], K, axis=0))
+    made, tested, edges = (W[::2], visible[::2]), (W[1::2], visible[1::2]), spread_edges(W, visible, np.arange(P))
+    blank = tested[1].copy()
+    blank[3] = False
+    told, less = (rigid_by(made, (tested[0], seen), PERSPECTIVE, edges) for seen in (tested[1], blank))
+    assert less.solid.whole_px == pytest.approx(told.solid.whole_px, rel=0.2)
+    assert less.flat.whole_px == pytest.approx(told.flat.whole_px, rel=0.2)
+    assert less.size_px == pytest.approx(told.size_px, rel=0.1)
 
 
 @given(SEEDS)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reconstruction.arrays import Array, Indices, Mask
-from reconstruction.window.robust import geman_mcclure
+from reconstruction.window.robust import RAYLEIGH_MEDIAN, geman_mcclure
 
 FEW_FUNCTIONS = 40  # where bending is held firmly
 ROUGH_SWEEPS = 4  # of re-weighting, with few functions and few points
@@ -16,6 +16,7 @@ SWEEPS = 3  # more with all functions, the last with all points
 ENOUGH = 0.8  # of the few points that must be seen
 GROSS = 8.0  # times the usual residual: not the same point
 FINEST = 1e-4  # of the image's RMS radius: no residual is usually smaller
+RANK = 1e-13  # of the largest eigenvalue, less of which is none
 NO_CREASES = np.zeros((0, 3))
 FOLDS_EASILY = 0.01  # stiffness of a crease: hardly any, but with half a sheet in sight it is not needed
 
@@ -96,6 +97,7 @@ def smooth_field(nodes: Array, functions: int, creases: Array = NO_CREASES) -> S
     off = np.eye(len(x)) - Q @ Q.T
     values, U = np.linalg.eigh(off @ kernel @ off)
     leading = np.argsort(-np.abs(values))[: max(0, min(functions, len(x)) - 3)]
+    leading = leading[np.abs(values[leading]) > RANK * np.abs(values).max()]  # less of nodes on top of each other
     values, U = values[leading], U[:, leading]
     size = np.sqrt(len(x))
     w = U / values
@@ -148,7 +150,7 @@ def weighted_fit(B: Array, target: Array, h: Array, held: Array) -> tuple[Array,
 def weights_of(residual: Array, finest: float) -> tuple[Array, float]:
     """Geman-McClure weights (n,) of residuals (n, 2), and the usual residual of a coordinate."""
     off = np.sqrt((residual**2).sum(axis=1))
-    usual = max(float(np.partition(off, len(off) // 2)[len(off) // 2]) / 1.1774, finest)  # of a Rayleigh distribution
+    usual = max(float(np.partition(off, len(off) // 2)[len(off) // 2]) / RAYLEIGH_MEDIAN, finest)
     return geman_mcclure(off / (GROSS * usual)), usual
 
 

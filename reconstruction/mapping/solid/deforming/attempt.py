@@ -119,7 +119,7 @@ def among_all(attempt: Attempt, some: Indices, shown: Shown) -> Attempt:
     rigid = shown.rigid
     seen = shown.W - rigid.camera.center_px[:, None], shown.sound.astype(np.float64)
     known = Bundle(attempt.about(rigid).rest.motion, 1 / rigid.camera.focal_px)
-    placed = with_others(*seen, known, some, np.zeros_like(rigid.rest.motion.shape))
+    placed = with_others(*seen, known, some)
     found = replace(rigid, rest=replace(rigid.rest, motion=placed.motion))
     again = modelled(found, shown, len(attempt.model.basis.eigenvalues))
     log_s = attempt.scales(again)
@@ -134,7 +134,7 @@ def modelled(found: Map, shown: Shown, modes: int = MOST_MODES) -> Model:
 
 
 def begun(found: Map, shown: Shown, modes: int = MOST_MODES, points: int = POINTS) -> tuple[Model, State]:
-    """Modes by what moves together, and pose and Λ' of each keyframe by itself.
+    """Modes by what moves together, and pose and Λ' of the keyframes, one after the other as of a video.
 
     Args:
         found: the map of keyframes, in their order.

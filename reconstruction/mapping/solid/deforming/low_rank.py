@@ -5,6 +5,8 @@ deformations. Images of K shapes, mixed anew in each, have rank 3K (Bregler, Her
 camera and deformation part where three columns of their motion make all rows orthogonal and equally long (Brand 2005).
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from reconstruction.arrays import Array, Mask
@@ -14,6 +16,7 @@ from reconstruction.mapping.first.factorization import rotations_from_rows
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.deforming.learning import POINTS
 from reconstruction.mapping.solid.placing import well_spread, with_others
+from reconstruction.mapping.solid.views import with_unseen
 from reconstruction.window.robust import deviation, fit_weights, lengths
 
 SWEEPS = 20  # of filling gaps by the factors, and making these
@@ -56,7 +59,8 @@ def posed(W: Array, visible: Mask, rigid: Bundle, shapes: int, far: float) -> Ri
         raise np.linalg.LinAlgError("no shape for these keyframes")
     found = RigidMotion(s[0] * shape, R, s / s[0], t)
     found = max((found, found.mirrored()), key=lambda one: alike(one.R, m.R))
-    return with_others(W, visible.astype(np.float64), Bundle(found, rigid.kappa), some, m.shape).motion
+    found = with_others(W, visible.astype(np.float64), Bundle(found, rigid.kappa), some).motion
+    return replace(found, shape=with_unseen(found.shape, np.asarray(visible.any(axis=0)), m.shape))
 
 
 def without_gaps(W: Array, visible: Mask, first: Array, rank: int, far: float) -> Array:

@@ -1,11 +1,12 @@
 import numpy as np
 
 from reconstruction.basis.mesh import triangulate
+from reconstruction.basis.modal_basis import principal_axes
 from reconstruction.basis.rest_shape import RigidMotion
 from reconstruction.evaluation import with_outliers
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.solid import bundle_adjust
-from reconstruction.mapping.solid.spikes import off_neighbours_plane, smoothed, without_new_spikes, worst_spike
+from reconstruction.mapping.solid.spikes import off_neighbours_plane, smoothed, without_new_spikes
 from tests.reconstruction.world import PERSPECTIVE, relief, seen, shape_error, spread, turn, turns
 
 
@@ -29,6 +30,13 @@ def test_points_on_top_of_each_other():
     points[:, 1] = points[:, 0]
     D, _ = off_neighbours_plane(points, triangulate(points.T).edges, np.ones(80, bool))
     assert np.isfinite(D.toarray()).all()
+
+
+def worst_spike(shape):
+    """Largest distance of a vertex (3, p) from its neighbours' plane over the shape's width."""
+    shape = principal_axes(shape).T @ shape
+    D, _ = off_neighbours_plane(shape[:2], triangulate(shape[:2].T).edges, np.ones(shape.shape[1], bool))
+    return np.abs(D @ shape[2]).max() / np.ptp(shape[:2], axis=1).mean()
 
 
 def test_points_that_do_not_move_with_the_solid_take_their_neighbours_depth():

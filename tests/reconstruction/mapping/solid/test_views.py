@@ -49,6 +49,17 @@ def test_views_that_share_nothing_are_built_on_last() -> None:
     assert np.isfinite(completed(W, visible, alike, int(order[0]))).all()
 
 
+def test_nothing_is_built_on_a_view_of_a_few_points() -> None:
+    """Three points fit any similarity."""
+    shape, seen_in_all = np.random.default_rng(4).normal(0, 50, (3, 60)), np.ones((15, 60), bool)
+    W = Rotation.from_rotvec(np.linspace(-0.4, 0.4, 15)[:, None] * [0, 1, 0]).as_matrix()[:, :2] @ shape
+    (middle,) = first_views(likeness(W, seen_in_all), seen_in_all)
+    assert 5 < middle < 9
+    few = seen_in_all.copy()
+    few[14, 3:] = False
+    assert first_views(likeness(W, few), few) == [middle]
+
+
 def test_points_that_no_view_shows_are_where_they_were_known_to_be() -> None:
     rng = np.random.default_rng(4)
     known = rng.normal(size=(3, 30))

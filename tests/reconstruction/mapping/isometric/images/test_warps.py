@@ -100,6 +100,13 @@ def test_field_reproduces_affine_functions_and_its_own_nodes() -> None:
     np.testing.assert_allclose((B[:, 3:] ** 2).mean(axis=0), 1, rtol=1e-6)
 
 
+def test_nodes_on_top_of_each_other_do_not_spoil_the_field() -> None:
+    nodes = np.random.default_rng(0).normal(0, 50, (2, 70))
+    field = smooth_field(np.concatenate([nodes, nodes[:, :3]], axis=1), 110)
+    assert np.abs(field.at(nodes)).max() < 100
+    assert field.stiffness.max() < 1e6
+
+
 def test_median_ignores_what_is_not_there() -> None:
     values = np.array([[1.0, np.nan, np.nan], [3.0, 2.0, np.nan], [2.0, 4.0, np.nan]])
     np.testing.assert_array_equal(median(values), [2.0, 3.0, np.nan])

@@ -3,6 +3,7 @@
 import pickle
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from reconstruction.mapping.solid.deforming.starts import likeliest, shallower
 from reconstruction.mapping.solid.solid import bundle_adjust
 from reconstruction.mapping.start import at_once
 from reconstruction.settings import Settings
-from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, seen, turns
+from tests.reconstruction.world import ORTHOGRAPHIC, PERSPECTIVE, relief, seen, shape_error, turns
 
 K, P = 30, 80
 FIRST_ARM, SECOND_ARM = 1, 2  # of every four points
@@ -49,6 +50,16 @@ def off_degrees(R: Array, true: Array) -> float:
     turn = nearest_rotation((R.transpose(0, 2, 1) @ true).sum(axis=0))
     cosine = (np.einsum("kij,jl,kil->k", R, turn, true) - 1) / 2
     return float(np.median(np.degrees(np.arccos(cosine.clip(-1, 1)))))
+
+
+def test_points_that_no_keyframe_shows_are_in_the_axes_of_the_others() -> None:
+    p, K = 600, 24
+    shape, R = relief(np.random.default_rng(0), p), turns(K, 30)
+    W = seen(np.repeat(shape[None], K, axis=0), R, replace(PERSPECTIVE, center_px=np.zeros(2)))[0]
+    visible = np.ones((K, p), bool)
+    visible[:, ::20] = False
+    known = Bundle(RigidMotion(shape, R, np.ones(K), np.zeros((K, 2))), 1 / PERSPECTIVE.focal_px)
+    assert shape_error(posed(W, visible, known, 2, 1e3).shape, shape) < 0.02
 
 
 def rigid(W: Array, visible: Mask, camera: Camera) -> Map:
