@@ -128,7 +128,7 @@ def followed(
         those are.
 
     Raises:
-        ReconstructionError: no truth point lies in the mesh.
+        ReconstructionError: fewer than 3 truth points lie in the mesh.
     """
     face, weights = locate(projections[0], mesh, truth_px)
     inside = face >= 0

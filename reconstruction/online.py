@@ -206,7 +206,7 @@ class Reconstruction:
             self.window.restart()
         seen = frame
         if self.window.state is None and not frame.shows_enough:  # as in the first frame after it that does
-            seen = next(one for one in self._waiting if one.shows_enough)
+            seen = next((one for one in self._waiting if one.shows_enough), frame)
         expected, foreseen = None, self._foresight.next()
         if self.deformation == "inextensible":
             if foreseen is None or seen is not frame:

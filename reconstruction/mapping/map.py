@@ -102,7 +102,10 @@ class Map:
         """Pose and Λ' of a shape (3, p) in camera axes, px, by the modes of a sheet; None for a solid."""
         if self.sheet is None:
             return None
-        return model.state_of(shape, self.sheet.camera, np.ones(shape.shape[1], np.bool_), None)
+        seen_by = Camera(self.sheet.camera.focal_px, self.camera.center_px)
+        if not self.camera.perspective:  # without a distance
+            shape = shape + np.array([[0.0], [0.0], [seen_by.focal_px]])
+        return model.state_of(shape, seen_by, np.ones(shape.shape[1], np.bool_), None)
 
     def turned_like(self, shape: Array) -> "Map":
         """The same or its mirror image, whichever is deep where a shape (3, p) is: seen without perspective, both fit."""

@@ -148,7 +148,7 @@ class Mapper:
     def _look_first(self, first: list[tuple[Array, Mask]], camera: Camera) -> None:
         """Begin a first model, if it is time."""
         n, settings = len(first), self._settings
-        if self._first_job is None and (n in self._looks or self._looked < self._looks[-1] < n):
+        if self._first_job is None and n > self._looked and (n in self._looks or self._looked < self._looks[-1] < n):
             last = n >= self._looks[-1]
             frames = *stacked(first), camera, settings
             due = self._frame + int(FIRST_LATENCY * n if self.latency else 0)

@@ -43,7 +43,7 @@ def map_of(
     """What keyframes W (K, 2, p) px with visibility (K, p) show, most different ones first; None where they do not tell.
 
     Args:
-        W: anything where not visible.
+        W: NaN where not visible.
         visible: (K, p).
         camera: its focal length may be a guess, if it is to be estimated.
         estimate_focal: whether the keyframes may change the focal length.

@@ -15,6 +15,7 @@ from reconstruction.state import State
 from reconstruction.window import priors
 
 FIRM = {"rest": 1e-2}  # of the guide: with less it now and then changes its side
+NEGLIGIBLE = 1e-4  # of the largest eigenvalue: of points that coincide it is 0, or just below
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Energy:
         centre: Λ̄' (3, r), the refined rest shape.
         inextensibility: κ on the mean squared edge strain term of `edges`.
         rows: rows of Λ that are estimated (§3.4): 0 and 1 stretch in the plane, 2 bends out of it.
-        free_scale: whether s is estimated; the paper's energy keeps s = 1.
+        free_scale: whether s is estimated; the paper's energy keeps that of the first frame, or after a loss.
         tied: whether the oldest frame is tied to the frame that has left the window; without, the window floats.
         edges: coarse edges of the inextensibility term.
         bending: how the rows of Λ that are not estimated follow from row τ; None: they stay at rest.
@@ -88,10 +89,10 @@ class Energy:
         return replace(state, Lambda=Lambda if self.bending is None else self.bending.completed(Lambda))
 
 
-def pose_energy(camera: Camera, tied: bool = False) -> Energy:
+def pose_energy(camera: Camera) -> Energy:
     """The energy of a rigid shape's poses."""
     scale = priors.PERSPECTIVE_SCALE if camera.perspective else priors.ORTHOGRAPHIC_SCALE
-    return Energy(rows=(), rest=0.0, rotation=1e-3, scale=scale, tied=tied)
+    return Energy(rows=(), rest=0.0, rotation=1e-3, scale=scale, tied=False)
 
 
 def build_energy(
@@ -116,7 +117,8 @@ def build_energy(
     weights = priors.weights(chosen or {}, deformation, perspective=model.camera.perspective, paper=paper)
     # A mode's eigenvalue says how much of the shape's extent it carries: weak modes are pulled to rest harder. By the
     # first ones, so that those are held alike however many there are.
-    stiffness = model.basis.eigenvalues**-0.5
+    values = model.basis.eigenvalues
+    stiffness = np.maximum(values, NEGLIGIBLE * values[0]) ** -0.5
     stiffness /= np.exp(np.log(stiffness[:USUAL_MODES]).mean())
     if pull is not None:
         weights = weights | {"rest": 0.0, "smoothness": 0.0}

@@ -94,7 +94,10 @@ class SlidingWindow:
         self.frames += 1
         self._switch = None
         if self.state is not None and len(self.state) > len(self._data):  # begun by the model before, which saw that frame
-            self.restart()
+            if self._data:
+                self.state = self.state[-len(self._data) :]
+            else:
+                self.restart()
         weights = start_weights(self._last_shape(), W, visible, self.model.radius_px)
         self._data.append(image_statistics(self.model, W, weights))
         window = self._started(W, weights)
@@ -124,7 +127,7 @@ class SlidingWindow:
         found = one_step(energy, data, expected)
         # The frame before stays for the prediction.
         self.state = found if self.state is None else join([self.state[-1:], found])
-        self._data, self._before = [*self._data[-1:], data], None
+        self._data, self._before, self._lost = [*self._data[-1:], data], None, None
         return self._estimate(W, visible, found)
 
     def restart(self) -> None:
@@ -155,6 +158,8 @@ class SlidingWindow:
     def _started(self, W: Array, weights: Array) -> State:
         """The window with the new frame as it starts, of at most its length."""
         if self.state is None:
+            if self._lost is not None and (weights > RELIABLE).sum() < FEWEST_POINTS:
+                return self._lost
             return self._alone(W, weights)
         window = join([self.state, off_the_saddle(self.state[-1:], self.model)])
         return self._without_oldest(window) if len(window) > self._length else window

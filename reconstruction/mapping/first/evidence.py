@@ -26,15 +26,11 @@ class Evidence:
     Attributes:
         factorization: of the judging points.
         turn_degrees: rotation covered.
-        relief: third over fourth singular value.
-        disagreement: relative difference of the shapes of even and odd frames.
         doubt: why a rigid shape is not to be trusted; empty if it is.
     """
 
     factorization: Factorization
     turn_degrees: float
-    relief: float
-    disagreement: float
     doubt: str
 
 
@@ -60,7 +56,7 @@ def weigh(W: Array, visible: Mask) -> Evidence:
         doubt = f"the object shows no relief above the noise in {len(W)} frames (ratio {relief:.1f})"
     elif disagreement > HALVES_AGREE:
         doubt = f"even and odd frames of the first {len(W)} give shapes that differ by {disagreement:.0%}"
-    return Evidence(result, turn, relief, disagreement, doubt)
+    return Evidence(result, turn, doubt)
 
 
 def judging_points(W: Array, visible: Mask) -> Indices:

@@ -12,6 +12,8 @@ from reconstruction import ReconstructionError
 from reconstruction.arrays import Array, Mask
 from reconstruction.basis.rest_shape import RigidMotion
 
+SWEEPS = 100  # of the affine fit, at most
+FEWEST_FREE = 0.2  # of the entries, that tell the noise
 STEADY_SCALE = 0.3  # weight of "the scale stays the same" against "the axes are orthogonal and equally long"
 
 
@@ -62,7 +64,7 @@ def factorize(W: Array, visible: Mask) -> Factorization:
     return Factorization(RigidMotion(S, R, s, t).in_first_frame(), singular, rms, condition)
 
 
-def affine_structure(W: Array, visible: Mask, sweeps: int = 100) -> tuple[Array, Array, Array]:
+def affine_structure(W: Array, visible: Mask) -> tuple[Array, Array, Array]:
     """A (F, 2, 3), t (F, 2), S (3, p) of the affine fit, by alternating least squares over the visible entries.
 
     Raises:
@@ -80,19 +82,24 @@ def affine_structure(W: Array, visible: Mask, sweeps: int = 100) -> tuple[Array,
     Vt = np.linalg.svd((filled - t[:, :, None]).reshape(2 * F, p), full_matrices=False)[2]
     S = Vt[:3] * np.sqrt(p)
     A = np.zeros((F, 2, 3))
-    previous = np.inf
-    for _ in range(sweeps):
+    previous, free = (
+        np.inf,
+        max(2 * h.sum() - 8 * F - 3 * p, FEWEST_FREE * h.sum()),
+    )  # entries that A, t and S do not take up
+    for _ in range(SWEEPS):
+        S = (S - S.mean(axis=1, keepdims=True)) / S.std(axis=1, keepdims=True).clip(1e-12)
         B = np.concatenate([S, np.ones((1, p))])
         motion = weighted_solve(np.einsum("ip,fp,jp->fij", B, h, B, optimize=True), known @ B.T)
         A, t = motion[:, :, :3], motion[:, :, 3]
         gram = np.einsum("fci,fp,fcj->pij", A, h, A, optimize=True)
+        # S has variance 1: a few noisy entries are not to carry a point far away.
+        gram += ((known - (A @ S + t[:, :, None]) * h[:, None]) ** 2).sum() / free * np.eye(3)
         right = np.einsum("fci,fcp->pi", A, (known - t[:, :, None]) * h[:, None], optimize=True)
         S = weighted_solve(gram, right[:, None, :])[:, 0].T
         error = float(((known - (A @ S + t[:, :, None]) * h[:, None]) ** 2).sum())
         if error > previous * (1 - 1e-6):
             break
         previous = error
-        S = (S - S.mean(axis=1, keepdims=True)) / S.std(axis=1, keepdims=True).clip(1e-12)
     t = t + A @ S.mean(axis=1)
     return A, t, S - S.mean(axis=1, keepdims=True)
 

@@ -21,7 +21,7 @@ from reconstruction.mapping.first.rigid import bundle_adjust
 from reconstruction.mapping.solid import solid
 from reconstruction.mapping.solid.bundle import Bundle
 from reconstruction.mapping.solid.hollow import disbelief
-from reconstruction.mapping.solid.placing import beside_others
+from reconstruction.mapping.solid.placing import FEWEST_POINTS, beside_others
 
 VIEWS = 16  # of the first frames are enough for a plane
 BENT = 0.012  # reprojection error over the image's extent, above which a sheet is not flat in all frames
@@ -68,7 +68,7 @@ def factorize_often_seen(W: Array, visible: Mask) -> RigidMotion:
     Raises:
         ReconstructionError: too few frames or points.
     """
-    often = visible.sum(axis=0) >= max(3, 0.2 * len(W))
+    often = visible.sum(axis=0) >= min(len(W), max(3, 0.2 * len(W)))
     if often.sum() < 4:
         raise ReconstructionError("cannot recover a rest shape: fewer than 4 points stay visible", "rest_shape")
     while True:
@@ -94,8 +94,10 @@ def plane(W: Array, visible: Mask, camera: Camera) -> RestShape:
         raise ReconstructionError("cannot recover a rest shape: fewer than 4 points are visible")
     first, chosen = first_image(W, visible), judging_points(W, visible)
     count = len(W)
-    if apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL or count < FEWEST_FLAT:
-        return RestShape("plane", tilted_sheet(first, np.eye(3), camera), "flat sheet facing the camera: nothing turns yet")
+    few = count < FEWEST_FLAT or len(chosen) < FEWEST_POINTS
+    if few or apparent_change(W[:, :, chosen], visible[:, chosen]) <= STILL:
+        why = "too few points or frames tell its tilt" if few else "nothing turns yet"
+        return RestShape("plane", tilted_sheet(first, np.eye(3), camera), f"flat sheet facing the camera: {why}")
     while True:
         frames = np.unique(np.linspace(0, count - 1, VIEWS).astype(int))
         views = np.where(visible[frames][:, None], W[frames], np.nan)[:, :, chosen]

@@ -16,7 +16,7 @@ SWEEPS = 3  # more with all functions, the last with all points
 ENOUGH = 0.8  # of the few points that must be seen
 GROSS = 8.0  # times the usual residual: not the same point
 FINEST = 1e-4  # of the image's RMS radius: no residual is usually smaller
-RANK = 1e-13  # of the largest eigenvalue, less of which is none
+RANK = 1e-9  # of the largest eigenvalue, less of which is none
 NO_CREASES = np.zeros((0, 3))
 FOLDS_EASILY = 0.01  # stiffness of a crease: hardly any, but with half a sheet in sight it is not needed
 

@@ -195,6 +195,28 @@ def test_a_point_never_seen_gets_a_place_too() -> None:
     np.testing.assert_array_equal(found[:, 4], W[6, :, 4])
 
 
+@pytest.mark.parametrize("seed", [2, 6, 7])
+def test_points_of_which_most_is_missing_are_put_where_the_others_say(seed: int) -> None:
+    """Those seen in two to four frames would be carried away by their noise."""
+    rng = np.random.default_rng(seed)
+    W, _ = views(flat(rng, POINTS), turns(40)[:10] @ turn((10, -8, 0)), PERSPECTIVE)
+    visible = rng.random((10, POINTS)) > 0.6
+    found = first_image(np.where(visible[:, None], W + rng.normal(0, 0.3, W.shape), np.nan), visible)
+    assert np.abs(found - W[0]).max() < 15
+
+
+@pytest.mark.parametrize("points", [4, 5])
+def test_a_plane_of_a_few_points_faces_the_camera(points: int) -> None:
+    W, visible = views(flat(np.random.default_rng(0), points), turns(FRAMES), PERSPECTIVE)
+    assert "too few points" in rest_shape.plane(W, visible, PERSPECTIVE).note
+
+
+def test_two_frames_are_too_few_for_a_rigid_shape_and_the_error_says_so() -> None:
+    W, visible = views(relief(np.random.default_rng(0), POINTS), turns(2), PERSPECTIVE)
+    with pytest.raises(ReconstructionError, match="2 frames of 60 points: at least 3 frames"):
+        rest_shape.rigid(W, visible, PERSPECTIVE)
+
+
 def test_a_sheet_that_bends_later_is_judged_by_its_flat_frames() -> None:
     rng = np.random.default_rng(4)
     sheet, tilt, frames = flat(rng, POINTS), turn((20, 0, 0)), 40
