@@ -13,6 +13,7 @@ from reconstruction.mapping.isometric.lengths import Edges, edges_of
 NODES, NEIGHBOURS = 80, 6
 FINE_NODES, FINE_NEIGHBOURS = 120, 8
 USUAL_STRAIN = 0.01  # of lengths that are seen exactly
+TOGETHER = 1e-12  # of the images' size, squared: points in one place, whose edge has no length
 FAR = 30.0  # focal length over the images' size, RMS, from which on perspective tells nothing
 
 
@@ -84,7 +85,7 @@ def neighbours(images: Array, count: int) -> Indices:
     near = np.argsort(farthest, axis=1)[:, : min(count, len(farthest) - 1)]
     pairs = np.stack([np.repeat(np.arange(len(near)), near.shape[1]), near.ravel()], axis=1)
     found: Indices = np.unique(np.sort(pairs, axis=1), axis=0)
-    return found
+    return np.asarray(found[farthest[tuple(found.T)] > TOGETHER])
 
 
 def on_edges(nodes: Nodes, field: SmoothField) -> Array:
