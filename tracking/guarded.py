@@ -19,7 +19,7 @@ RECENT_FRAMES = 3  # whose best share of points seen is compared: a surface that
 COLLAPSED_SHARE = 0.5  # of that share: less in one frame, and ...
 FEW_SHARE = 0.4  # ... less than this share of all points, looks like a cut
 LOST_SHARE = 0.1  # share of the points below which the surface is lost, however slowly it went
-MIN_POINTS = 12  # fewer, and it is lost, too
+MIN_POINTS, MIN_SHARE = 12, 0.5  # fewer, and it is lost, too; of few points, less than this share
 FOUND_SHARE = 0.2  # share of the points that must look right to believe that the surface is back
 SEARCH_EVERY_FRAME = 15  # so many frames it is searched for in each frame; later, to save time, ...
 SEARCH_EVERY = 5  # ... in one out of so many
@@ -85,6 +85,7 @@ class GuardedTracker:
         self._reference = self._image = image_bgr  # until it is described, and the last that showed the surface
         self._points = self._reference_px = points_px
         self._tracker = PointTracker(image_bgr, points_px)
+        self._least = min(MIN_POINTS, int(MIN_SHARE * len(points_px)))
         self._left_behind = LeftBehind(points_px)
         self._relocalisation: Relocalisation | Future[Relocalisation] | None = None
         self._regain_every, self._partly = REGAIN_EVERY, 0  # frames; of them those in which it is seen only partly
@@ -103,7 +104,7 @@ class GuardedTracker:
         share = self._share(observation)
         just_now = max(self._shares)
         jumped = share < COLLAPSED_SHARE * just_now and share < FEW_SHARE
-        if jumped or share < LOST_SHARE or observation.visible.sum() < MIN_POINTS:
+        if jumped or share < LOST_SHARE or observation.visible.sum() < self._least:
             self.lost, self.frames_lost = True, 1
             how = f"only {share:.0%} of the points are seen"
             how += f", {just_now:.0%} just before: a cut or a jump" if jumped else ": it is covered or has left the picture"
@@ -199,7 +200,7 @@ class GuardedTracker:
         return self.frames_lost <= SEARCH_EVERY_FRAME or self.frames_lost % SEARCH_EVERY == 0
 
     def _good(self, observation: Observation, share: float) -> bool:
-        return self._share(observation) >= share and int(observation.visible.sum()) >= MIN_POINTS
+        return self._share(observation) >= share and int(observation.visible.sum()) >= self._least
 
     def _share(self, observation: Observation) -> float:
         """Of the points that are on the surface those that are seen."""

@@ -60,7 +60,6 @@ class Relocalisation:
         if len(pairs) < MIN_MATCHES:
             return None
         there, here = self._places[pairs], places[best[pairs]]
-        cv2.setRNGSeed(0)  # the same video gives the same result
         affine, agree = cv2.estimateAffine2D(there, here, ransacReprojThreshold=AFFINE_ERROR * self._extent, maxIters=4000)
         if affine is None or int(agree.sum()) < MIN_MATCHES:
             return None

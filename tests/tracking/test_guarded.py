@@ -150,3 +150,15 @@ def test_a_change_of_light_is_another_picture_of_the_same_background(light: floa
     surface = np.array([[250.0, 200.0], [390.0, 200.0], [390.0, 300.0], [250.0, 300.0]])
     assert same_background(page, brighter, surface)
     assert not same_background(page, cv2.resize(texture(4), (640, 480)), surface)
+
+
+def test_a_surface_of_a_few_points_is_not_lost_with_one_of_them() -> None:
+    places = np.array([[60.0 + 50 * (k % 4), 60.0 + 55 * (k // 4)] for k in range(12)])
+    image, spots = np.full_like(IMAGE, 120), texture(seed=4)
+    for x, y in places.astype(int):
+        image[y - 12 : y + 13, x - 12 : x + 13] = spots[y - 12 : y + 13, x - 12 : x + 13]
+    tracker, covered = GuardedTracker(image, places), image.copy()
+    covered[45:75, 40:80] = 120
+    for _ in range(20):
+        now = tracker.track(covered)
+        assert now.observation.visible.sum() >= 10

@@ -46,6 +46,8 @@ def region_mask(
             told = " ".join(f"{value:g}" for value in polygon)
             raise TrackingError(f"the corners {told} have no area in the picture of {width}x{height} px")
         region &= inside
+    if not region.any() and mask is None:
+        raise TrackingError("the rectangle and the corners do not meet: no pixel lies in both")
     if not region.any():
         where = f"{mask}" if roi is None else f"{mask} within the region {roi[0]} {roi[1]} {roi[2]} {roi[3]}"
         raise TrackingError(f"the mask is empty: {where} is black; paint the surface to follow white")

@@ -90,24 +90,18 @@ class Search:
         """Whether further frames would not tell more."""
         return self.frames >= MOST_FRAMES or (self.frames >= LEAST_FRAMES and self._far(self._way))
 
-    @property
-    def faint(self) -> bool:
-        """Whether the first frame was much fainter than the last."""
-        return self._contrast_now() > CLEARER * self._contrast
-
     def add(self, image_bgr: Image) -> bool:
         """Look at the next frame; False if most points are lost, or it is much clearer: nothing of it is kept."""
         before, self._grays, last = self._grays, Grays.of(image_bgr), self._tracks[-1]
         self._last = image_bgr
         moved, seen = np.full_like(last, np.nan), np.flatnonzero(np.isfinite(last[:, 0]))
-        if len(seen):
-            there, good = followed(before, self._grays, last[seen])
-            if good.mean() < FEW_GUIDES:  # a change of light is no motion
-                evened, also = followed(before.evened, self._grays.evened, last[seen])
-                there, good = (evened, also) if also.sum() > good.sum() else (there, good)
-            moved[seen[good]] = there[good]
-            if good.sum() < SEEN * len(last) or self._contrast_now() > CLEARER * self._contrast:
-                return False
+        there, good = followed(before, self._grays, last[seen])
+        if good.mean() < FEW_GUIDES:  # a change of light is no motion
+            evened, also = followed(before.evened, self._grays.evened, last[seen])
+            there, good = (evened, also) if also.sum() > good.sum() else (there, good)
+        moved[seen[good]] = there[good]
+        if good.sum() < SEEN * len(last) or self._contrast_now() > CLEARER * self._contrast:
+            return False
         self._tracks.append(moved)
         way = np.linalg.norm(moved - self._tracks[0], axis=1)
         if self._far(way):  # unless it is the camera that went, and something else goes its own way
@@ -220,12 +214,12 @@ def search(frames: Iterable[Frame], region: Image) -> Found:
     for frame in islice(frames, MOST_WAITED):
         if begun is not None:
             same = begun[0].add(frame.image)
-            if same and not begun[0].faint:
+            if same:
                 if begun[0].enough:
                     break
                 continue
             looked_at = begun[0].frames >= LEAST_FRAMES
-            if not same and looked_at and begun[0].moved_px > 0.5 * FAR_ENOUGH * max(region.shape):
+            if looked_at and begun[0].moved_px > 0.5 * FAR_ENOUGH * max(region.shape):
                 break
             earlier, begun = farther(earlier, begun), None
         try:

@@ -32,13 +32,11 @@ class Surface:
         mask: (H, W) uint8, 255 where it is.
         own: (P,) points on it.
         other: (P,) points of something else.
-        motion_px: median of how far they went.
     """
 
     mask: Image
     own: Flags
     other: Flags
-    motion_px: float
 
     @property
     def box(self) -> tuple[int, int, int, int]:
@@ -138,12 +136,11 @@ def surface_of(W: Array, group: Flags, grouped: Flags, region: Image) -> Surface
     """The surface that a group (P,) of points is on; `grouped` (P,) are in this or another one."""
     off, carried, way = astray_px(W, group)
     own = group & (way > SHARED * carried)  # else it was not seen when the others moved
-    motion = float(np.median(way[own]))
     other = ~group & (grouped | ((off > STRAY_PX) & (way < SHARED * carried)))
     doubtful = ~own & ~other & ~region.all()  # in a region that somebody chose, points that were lost are as good ...
     if (grouped & ~group).sum() > BESIDE:
         doubtful &= off <= np.maximum(astray_px(W, grouped & ~group)[0], STRAY_PX)  # ... unless they went as the others
-    return Surface(surface_mask(W[0], own | doubtful, other, region), own, other, motion)
+    return Surface(surface_mask(W[0], own | doubtful, other, region), own, other)
 
 
 def astray_px(W: Array, own: Flags) -> tuple[Array, Array, Array]:
@@ -194,7 +191,7 @@ def surface_mask(place: Array, own: Flags, others: Flags, region: Image) -> Imag
     cv2.drawContours(
         mask, [c for c, level in zip(contours, levels[0], strict=True) if level[3] < 0], -1, (255,), cv2.FILLED
     )
-    x, y = np.rint(place[others]).astype(int).T
+    x, y = np.rint(place[others]).astype(int).T.clip(0, np.array(mask.shape[::-1])[:, None] - 1)  # may be at the border
     for contour, level in zip(contours, levels[0], strict=True):
         hole = np.zeros_like(mask)
         if (

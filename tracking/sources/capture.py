@@ -47,14 +47,15 @@ class Reconnecting:
 
     def __init__(self, url: str, capture: Capture, closing: threading.Event, log: Log) -> None:
         self._url, self._capture, self._closing, self._log = url, capture, closing, log
-        self._began = False
+        self._first: Image | None = None  # its first picture
 
     def grab(self) -> bool:
         """Go to the next picture; False if the stream never gave one, or stays broken."""
         if self._capture.grab():
-            self._began = True
+            if self._first is None:
+                self._first = self._capture.retrieve()[1]
             return True
-        if not self._began or self._closing.is_set():
+        if self._first is None or self._closing.is_set():
             return False
         broken = monotonic()
         self._log(f"{self._url} broke: connecting again")
@@ -62,6 +63,11 @@ class Reconnecting:
             self._capture.release()
             self._capture = open_url(self._url)
             if self._capture.grab():
+                again = self._capture.retrieve()[1]
+                if again.std() > 0 and np.array_equal(again, self._first):  # a file that does not say how long it is
+                    self._capture.release()
+                    self._first = None
+                    return False
                 self._log(f"{self._url} resumed after {monotonic() - broken:.1f} s")
                 return True
         if not self._closing.is_set():
@@ -108,6 +114,8 @@ def pixel_aspect(capture: Capture) -> float:
     """Width of a video's pixels over their height; 1 where it does not say, or what nobody believes."""
     wide, high = capture.get(cv2.CAP_PROP_SAR_NUM), capture.get(cv2.CAP_PROP_SAR_DEN)
     aspect = wide / high if wide > 0 and high > 0 else 1.0
+    if capture.get(cv2.CAP_PROP_ORIENTATION_META) % 180 == 90:  # pictures come upright, their pixels as they are stored
+        aspect = 1 / aspect
     return aspect if 1 / MOST_ASPECT < aspect < MOST_ASPECT else 1.0
 
 
@@ -126,14 +134,8 @@ def few_bits(source: str) -> float | None:
     if not Path(source).is_file():
         return None
     capture = cv2.VideoCapture(source)
-    bits = few_bits_of(cast(Capture, capture)) if capture.isOpened() else None
+    bits = bits_per_px(cast(Capture, capture)) if capture.isOpened() else None
     capture.release()
-    return bits
-
-
-def few_bits_of(capture: Capture) -> float | None:
-    """The same of an open video."""
-    bits = bits_per_px(capture)
     return bits if bits is not None and bits < FEW_BITS else None
 
 
@@ -174,7 +176,7 @@ def open_capture(source: str, closing: threading.Event, log: Log, *, decodes: bo
     if not os.access(path, os.R_OK):
         raise TrackingError(f"{source} cannot be read: permission denied")
     file = cast(Capture, cv2.VideoCapture(source)) if decodes else Decoder(source)
-    if (bits := few_bits_of(file)) is not None:
+    if (bits := few_bits(source)) is not None:
         log(f"{source} is compressed to {bits:.2g} bits a pixel: little texture is left to follow; export it with more")
     return squared(file, source, log)
 

@@ -1,6 +1,7 @@
 """Files that OpenCV makes no pictures of, by the decoders of PyAV: AV1, and interlaced video."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from itertools import chain
 from typing import TYPE_CHECKING, cast
 
@@ -33,7 +34,12 @@ class Decoder:
         except (av.FFmpegError, IndexError) as error:
             raise TrackingError(f"{source} cannot be decoded; it is not a video, or it is damaged or cut off") from error
         self._stream.thread_type = "AUTO"
-        self._frames = self._progressive(self._file.decode(self._stream))
+        frames, first = self._progressive(self._whole()), None
+        with suppress(av.FFmpegError):
+            first = next(frames, None)
+        self._rotation = first.rotation if first else 0
+        self._frames = chain(filter(None, [first]), frames)
+        self._began_s = float((self._stream.start_time or 0) * (self._stream.time_base or 0))
         self._frame: VideoFrame | None = None
 
     def grab(self) -> bool:
@@ -57,8 +63,9 @@ class Decoder:
         rate, aspect = float(stream.average_rate or 0), stream.sample_aspect_ratio
         seconds = float(stream.duration * stream.time_base) if stream.duration and stream.time_base else 0.0
         return {
-            cv2.CAP_PROP_POS_MSEC: 1000 * (self._frame.time or 0.0) if self._frame else 0.0,
+            cv2.CAP_PROP_POS_MSEC: 1000 * ((self._frame.time or 0.0) - self._began_s) if self._frame else 0.0,
             cv2.CAP_PROP_FPS: rate,
+            cv2.CAP_PROP_ORIENTATION_META: float(self._rotation),
             cv2.CAP_PROP_FRAME_COUNT: float(stream.frames or round(rate * seconds)),
             cv2.CAP_PROP_SAR_NUM: float(aspect.numerator) if aspect else 0.0,
             cv2.CAP_PROP_SAR_DEN: float(aspect.denominator) if aspect else 0.0,
@@ -67,6 +74,14 @@ class Decoder:
     def release(self) -> None:
         """Close the file."""
         self._file.close()
+
+    def _whole(self) -> "Iterator[VideoFrame]":
+        """The frames of packets that are not damaged; those of the file would end at the first that is."""
+        from av import InvalidDataError
+
+        for packet in self._file.demux(self._stream):
+            with suppress(InvalidDataError):
+                yield from packet.decode()
 
     def _progressive(self, frames: "Iterator[VideoFrame]") -> "Iterator[VideoFrame]":
         """The frames, those of interlaced video with the lines in between reckoned anew (BWDIF)."""

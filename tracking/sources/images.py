@@ -30,15 +30,15 @@ class ImageFiles:
 
     def __init__(self, pattern: str, log: Callable[[str], None] = lambda _: None) -> None:
         path = Path(pattern)
-        name = re.fullmatch(r"(.*?)%0?(\d*)d(.*)", path.name)
+        name = re.fullmatch(r"(.*?)(%0?\d*d)(.*)", path.name)
         if name is None:
             raise TrackingError(f"{pattern}: give the number of the image once in the file's name, as img%04d.png")
-        before, _, after = name.groups()
+        before, number, after = name.groups()
         numbered = re.compile(re.escape(before) + r"(\d+)" + re.escape(after))
         found: list[tuple[int, Path]] = []
         if path.parent.is_dir():
             matches = ((numbered.fullmatch(file.name), file) for file in path.parent.iterdir())
-            found = [(int(m[1]), file) for m, file in matches if m and path.name % int(m[1]) == file.name]
+            found = [(int(m[1]), file) for m, file in matches if m and number % int(m[1]) == m[1]]
         if not found:
             raise TrackingError(f"no image file matches {pattern}; the number stands for the frame, as in img%04d.png")
         files = dict(sorted(found))

@@ -27,11 +27,13 @@ class FirstLook:
 
     Attributes:
         frames: the frames of the run.
+        video: that gives them: another one if they are read again.
         region: (H, W) uint8, 255 where the surface is in the first of them.
         notes: what was found and how to overrule it, a line each.
     """
 
     frames: Iterator[Frame]
+    video: Video
     region: Image
     notes: list[str]
 
@@ -45,15 +47,19 @@ def first_look(footage: Footage, video: Video) -> FirstLook:
     copy, region = WorkingCopy.of(footage, video.size), region_mask(video.size, footage.roi, footage.mask, footage.outline)
     frames: Iterator[Frame] = map(copy.keep, video)
     if not footage.search or footage.outline is not None:  # drawn by hand
-        return FirstLook(frames, region, [])
+        return FirstLook(frames, video, region, [])
     kept = deque[Frame]()
     found = copy.found(search(copies(keeping(frames, kept, ends=video.live), copy), copy.picture(region)))
     if footage.drop_late:
         kept = deque(frame for frame in kept if frame.index >= found.first.index)
         kept = deque(list(kept)[:: len(kept) // LEADING + 1])
-    frames = chain(emptied(kept), frames) if kept else map(copy.keep, again(footage))
+    notes = notes_on(found, video.first_index)
+    if not kept:
+        video.close()
+        video = Video(footage.source, *footage.frame_range, duration_s=footage.duration)
+    frames = chain(emptied(kept), frames) if kept else map(copy.keep, video)
     begun = next(frame for frame in frames if frame.index >= found.first.index)
-    return FirstLook(chain([begun], frames), found.region, notes_on(found, video.first_index))
+    return FirstLook(chain([begun], frames), video, found.region, notes)
 
 
 def keeping(frames: Iterator[Frame], kept: deque[Frame], *, ends: bool) -> Iterator[Frame]:
@@ -87,12 +93,6 @@ def pack(image: Image) -> Image:
 def unpack(image: Image) -> Image:
     """The picture (H, W, 3) BGR again."""
     return image if image.ndim == 3 else cast(Image, cv2.cvtColor(image, cv2.COLOR_YUV2BGR_I420))
-
-
-def again(footage: Footage) -> Iterator[Frame]:
-    """All frames of a file."""
-    with Video(footage.source, *footage.frame_range, duration_s=footage.duration) as video:
-        yield from video
 
 
 def copies(frames: Iterable[Frame], copy: WorkingCopy) -> Iterator[Frame]:

@@ -1,6 +1,7 @@
 """The stage that reads the source and follows points in it."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import cast
@@ -67,7 +68,7 @@ class TrackingStage:
         """
         if self._frames is None:
             look = first_look(self._footage, self.video)
-            self._frames, self._region = look.frames, look.region
+            self._frames, self._region, self.video = look.frames, look.region, look.video
             self._told += look.notes
         began = perf_counter()
         frame = next(self._frames, None)
@@ -124,7 +125,8 @@ class TrackingStage:
             region = self._looked_for(image) if self._region is None else self._region
             if region is None:
                 return None
-            points_px = first_points(self._footage, image, region, self._copy)
+            footage = replace(self._footage, rest_shape="auto") if one else self._footage  # a mesh is the first one's
+            points_px = first_points(footage, image, region, self._copy)
         except TrackingError as error:
             self._search = None
             return error

@@ -78,7 +78,7 @@ class WorkingCopy:
         return replace(found, region=self.region(found.region), surface=best, others=others)
 
     def _surface(self, surface: Surface) -> Surface:
-        return replace(surface, mask=self.region(surface.mask), motion_px=self.factor * surface.motion_px)
+        return replace(surface, mask=self.region(surface.mask))
 
 
 def resized(image: Image, size: tuple[int, int]) -> Image:

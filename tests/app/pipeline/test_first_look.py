@@ -10,7 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from app.pipeline.stages.first_look import first_look, keeping, pack, unpack
-from app.pipeline.stages.messages import Footage
+from app.pipeline.stages.messages import Asked, Begun, Footage
+from app.pipeline.stages.tracking import TrackingStage
+from app.terminal.errors import UsageError
 from tests.tracking.region.test_search import scene
 from tracking import TrackingError
 from tracking.video import Frame, Video
@@ -104,3 +106,15 @@ def test_large_pictures_are_kept_in_half_the_memory(size: tuple[int, int], packe
     grays = [cv2.cvtColor(one, cv2.COLOR_BGR2GRAY).astype(int) for one in (image, unpack(kept))]
     assert np.abs(grays[0] - grays[1]).max() <= (3 if packed else 0)
     assert np.median(np.abs(unpack(kept).astype(int) - image)) <= (1 if packed else 0)
+
+
+def test_a_mesh_of_the_first_object_says_nothing_of_the_next(source: Path, tmp_path: Path) -> None:
+    mesh = tmp_path / "elsewhere.obj"
+    mesh.write_text("v 0 0 0\nv 9 0 0\nv 0 9 0\nv 9 9 1\nf 1 2 3\nf 2 4 3\n")
+    stage = TrackingStage(Footage(str(source), (BLACK, None), search=False, rest_shape=str(mesh)))
+    with pytest.raises(UsageError, match="does not fit"):
+        stage.next(Asked({0: None}), lambda *_: None)
+    seen = stage.next(Asked({1: None}), lambda *_: None)
+    assert seen is not None
+    assert isinstance(seen.objects[1], Begun)
+    stage.video.close()

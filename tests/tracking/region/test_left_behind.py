@@ -64,3 +64,11 @@ def test_the_tracker_gives_them_up() -> None:
     assert astray[~on_mark].mean() < 0.1
     assert any("stay behind" in text for text in told)
     assert not tracker.lost
+
+
+def test_the_page_of_a_card_that_lies_is_kept_though_points_are_far_apart() -> None:
+    points = 3 * POINTS
+    behind = LeftBehind(points)
+    for k in range(90):
+        turned = np.clip(points[:, 0] - 400, 0, None) * k / 90  # about a crease: those 50 px from it go as far
+        assert behind.look(seen(points - np.stack([turned, 0.3 * turned], axis=1))) == 0

@@ -86,3 +86,18 @@ def test_points_among_others_have_a_surface_however_scattered() -> None:
         rng = np.random.default_rng(seed)
         place, own = rng.uniform(0, [319, 239], (200, 2)), np.arange(200) < rng.integers(4, 20)
         assert surface_mask(place, own, ~own, region).any()
+
+
+def test_a_rectangle_and_corners_that_do_not_meet() -> None:
+    with pytest.raises(TrackingError, match="do not meet"):
+        region_mask(SIZE, (0, 0, 20, 20), None, [30, 30, 50, 30, 50, 40, 30, 40])
+
+
+def test_a_hole_is_cut_for_what_has_left_the_picture_too() -> None:
+    places = np.stack(np.meshgrid(np.arange(0.0, 200, 4), np.arange(0.0, 160, 4)), axis=2).reshape(-1, 2)
+    around = np.linalg.norm(places - [150, 80], axis=1)
+    own, others = (around > 30) & (around < 60), (around <= 30) | (places[:, 0] < 60)
+    places[np.flatnonzero(others)[-1]] = 205.0, 80.0  # a tracker follows points a little farther
+    mask = surface_mask(places, own, others, np.full((160, 200), 255, np.uint8))
+    assert mask[80, 150] == 0
+    assert mask[80, 110] == 255

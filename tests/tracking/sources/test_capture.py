@@ -4,6 +4,7 @@ import re
 import struct
 import subprocess
 import sys
+import threading
 from fractions import Fraction
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import pytest
 
 from tests.tracking.scene import texture
 from tracking import TrackingError
-from tracking.sources.capture import probe
+from tracking.sources.capture import Reconnecting, pixel_aspect, probe
 from tracking.sources.decoder import Decoder
 from tracking.video import Frame, Video
 
@@ -104,15 +105,16 @@ def test_times_in_the_decoder_s_order_are_not_believed(shared_data: Path) -> Non
         assert [frame.time_s for frame in video] == pytest.approx([k / video.fps for k in range(40)])
 
 
-def encoded(path: Path, pixel_aspect: Fraction = Fraction(1), bit_rate: int | None = None) -> Path:
+def encoded(path: Path, pixel_aspect: Fraction = Fraction(1), bit_rate: int | None = None, *, moving: bool = False) -> Path:
     with av.open(str(path), "w") as file:
         stream = file.add_stream("libx264", 30)
         stream.width, stream.height, stream.pix_fmt = 320, 240, "yuv420p"
         stream.codec_context.sample_aspect_ratio = pixel_aspect
         if bit_rate:
             stream.bit_rate = bit_rate
-        for _ in range(30):
-            file.mux(stream.encode(av.VideoFrame.from_ndarray(texture(), format="bgr24")))
+        for k in range(30):
+            picture = np.roll(texture(), 3 * k if moving else 0, axis=1)
+            file.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
         file.mux(stream.encode(None))
     return path
 
@@ -132,3 +134,51 @@ def test_a_poor_bit_rate_is_told(tmp_path: Path) -> None:
     assert "bits a pixel" in "".join(told)
     Video(str(encoded(tmp_path / "usual.mp4"))).close()
     assert len(told) == 1
+
+
+@pytest.mark.parametrize("turn", [90, 270])
+def test_pixels_of_an_upright_video_are_stretched_the_other_way(tmp_path: Path, turn: int) -> None:
+    turned = tmp_path / "turned.mp4"
+    turned.write_bytes(with_rotation(encoded(tmp_path / "wide.mp4", Fraction(4, 3)).read_bytes(), turn))
+    with Video(str(turned)) as video:
+        assert video.size == (240, 427)
+    assert pixel_aspect(Decoder(str(turned))) == pytest.approx(3 / 4)
+
+
+def test_a_damaged_packet_costs_its_own_frames_alone(tmp_path: Path) -> None:
+    path = tmp_path / "damaged.mp4"
+    encoded(path, moving=True)
+    with av.open(str(path)) as file:
+        at, size = next((packet.pos, packet.size) for k, packet in enumerate(file.demux(video=0)) if k == 9)
+    data = bytearray(path.read_bytes())
+    data[at : at + size] = bytes(size)
+    path.write_bytes(data)
+    decoder = Decoder(str(path))
+    assert sum(decoder.grab() for _ in range(40)) > 20
+
+
+class Repeated:
+    """A stream of three pictures that is as new whenever it is opened."""
+
+    def __init__(self) -> None:
+        self.gone = 0
+
+    def grab(self) -> bool:
+        self.gone += 1
+        return self.gone <= 3
+
+    def retrieve(self) -> tuple[bool, np.ndarray]:
+        return True, texture(seed=self.gone)
+
+    def get(self, propId: int, /) -> float:
+        raise NotImplementedError(propId)
+
+    def release(self) -> None:
+        self.gone = 9
+
+
+def test_a_file_from_a_server_that_tells_no_length_is_not_shown_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tracking.sources.capture.open_url", lambda _: Repeated())
+    monkeypatch.setattr("tracking.sources.capture.RETRY_S", 0.0)
+    stream = Reconnecting("http://here/film.webm", Repeated(), threading.Event(), lambda _: None)
+    assert [stream.grab() for _ in range(5)] == [True] * 3 + [False] * 2

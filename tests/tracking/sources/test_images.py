@@ -86,3 +86,9 @@ def test_a_frame_of_another_size_is_fitted(tmp_path: Path) -> None:
 
 def test_a_single_image_is_a_video_of_one_frame(images: Path) -> None:
     assert len(frames(images.parent / "img0007.png")) == 1
+
+
+def test_a_percent_sign_in_the_name_is_one(tmp_path: Path) -> None:
+    for i in range(3):
+        cv2.imwrite(str(tmp_path / f"take 50%_{i:04d}.png"), picture(i))
+    assert len(frames(tmp_path / "take 50%_%04d.png")) == 3

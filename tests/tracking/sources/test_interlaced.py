@@ -4,6 +4,7 @@ from pathlib import Path
 
 import av
 import numpy as np
+import pytest
 
 from tracking.sources.decoder import Decoder, interlaced
 from tracking.video import Video
@@ -69,3 +70,9 @@ def test_others_are_read(tmp_path: Path) -> None:
     assert not interlaced(str(path))
     with Video(str(path)) as video:
         assert len(list(video)) == 5
+
+
+def test_times_begin_at_0_whatever_clock_the_stream_has(tmp_path: Path) -> None:
+    """That of a transport stream begins at 1.4 s."""
+    with Video(str(written(tmp_path / "tape.ts", lines=True))) as video:
+        assert [frame.time_s for frame in video] == pytest.approx([0.0, 0.04, 0.08, 0.12, 0.16])
