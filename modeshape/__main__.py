@@ -12,12 +12,26 @@ def main() -> NoReturn:
     codes: list[object] = []
     atexit.register(leave, codes)  # before all others, so it is called after them
     try:
+        begin()
+    except SystemExit as stop:
+        codes.append(stop.code)
+        raise
+    except KeyboardInterrupt:  # before anything was begun
+        codes.append(130)
+        sys.exit(130)
+
+
+def begin() -> NoReturn:
+    """Import what the command needs, while its other processes begin, and carry it out."""
+    try:
         isolate()
     except FileNotFoundError:
         sys.stderr.write("error: the current folder is gone: change to another\n")
         sys.exit(2)
     from app.environment import environment
+    from app.processes.descriptors import hold
 
+    hold()
     os.environ.update(environment())
     if sys.argv[1:2] == ["run"] and not {"-h", "--help", "--help-all"} & set(sys.argv):
         from app.pipeline.stages.launched import WAITING, Launched
@@ -25,11 +39,7 @@ def main() -> NoReturn:
         WAITING.append(Launched())
     from app.commands.cli import main as run
 
-    try:
-        run()
-    except SystemExit as stop:
-        codes.append(stop.code)
-        raise
+    run()
 
 
 def leave(codes: list[object]) -> None:

@@ -42,7 +42,7 @@ class Frame(Estimate):
     Attributes:
         time_s: of the frame.
         image: (H, W, 3) BGR.
-        surface: 1, 2, … of the surfaces followed one after another; each has its own points and faces.
+        surface: 1, 2, … of the surfaces followed one after another; each has its own points; their faces may change.
         focal_px: of the camera; infinite if it is orthographic.
     """
 

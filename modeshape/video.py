@@ -1,8 +1,9 @@
 """Shapes from a video, frame by frame."""
 
+import atexit
 import logging
-from collections.abc import Iterator
-from contextlib import closing
+from collections.abc import Generator, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import asdict
 from math import isinf
 from os import PathLike
@@ -90,14 +91,24 @@ def reconstruct(
 
 def _frames(session: Session) -> Iterator[Frame]:
     surface, number = None, 1
-    with closing(session.frames()) as processed:
+    with closing(session.frames()) as processed, closed_at_exit(processed):
         for one in processed:
-            if surface is not None and one.surface is not surface:
+            if surface is not None and one.surface is not None and one.surface.points_px is not surface.points_px:
                 number += 1
             surface = one.surface
             yield _frame(one, number)
     if session.interrupted:  # it has ended the run, and is for the caller, too
         raise KeyboardInterrupt
+
+
+@contextmanager
+def closed_at_exit(frames: Generator[Processed, None, None]) -> Iterator[None]:
+    """Frames of a run that is left half-way end with the program, while it still has threads and signals."""
+    atexit.register(frames.close)
+    try:
+        yield
+    finally:
+        atexit.unregister(frames.close)
 
 
 def _frame(one: Processed, number: int) -> Frame:

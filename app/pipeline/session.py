@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Generator, Iterator
+from contextlib import ExitStack
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -40,8 +41,7 @@ class Session:
         launched: the stages' processes, if they have been begun already.
 
     Attributes:
-        fps: announced rate of the video, once the frames have begun.
-        recordings: the files written so far.
+        fps, recordings: announced rate of the video, once the frames have begun; the files written so far.
         interrupted: whether the run ends early; whoever sets it ends the run with the next frame.
         summary: once the frames have ended: counts of the whole run, and what came of the first object.
 
@@ -52,8 +52,7 @@ class Session:
     summary: RunSummary
 
     def __init__(self, config: Run, progress: Progress, *, record: bool = True, launched: Launched | None = None) -> None:
-        self._launched = launched
-        self._config, self._progress, self._record_unnamed = config, progress, record
+        self._launched, self._config, self._progress, self._record_unnamed = launched, config, progress, record
         check_files(config)
         self._watch, self._counts, self._order = Stopwatch(), Counts(), InOrder()
         self._surface: Surface | None = None
@@ -115,6 +114,7 @@ class Session:
         except KeyboardInterrupt:
             self.interrupted = True
         except ReconstructionError:
+            self._save(last=True)
             raise
         except BaseException:  # nobody wants more; the source or a stage has ended, a disk is full, or it is our mistake
             self.interrupted = True
@@ -126,22 +126,21 @@ class Session:
     def _process(self, seen: Seen) -> None:
         """Make shapes of a frame's points, record what is known, and ask for another frame."""
         tracked = self._object
+        self._split_recording(seen)
         guarded = tracked.follow(seen.points(tracked.number))
-        image = self._tracking.picture(seen.number, keep=self._order.wanted)
-        frame = Frame(seen.index, seen.time_s, image)
+        frame = Frame(seen.index, seen.time_s, self._tracking.picture(seen.number, keep=self._order.wanted))
         self._tell_changes(seen, guarded)
         self._counts.add(guarded, lost=tracked.lost)
         self._order.add(frame, guarded.observation)
-        if tracked.lost and self._surface:
-            self._order.end(self._surface)
         phase = tracked.phase
         shapes = tracked.shape(seen.index, seen.time_s, guarded.observation)
         self._others.look(seen, partial(self._tracking.picture, seen.number, keep=True))
         self._tracking.send(self._others.asked(seen, tracked))  # as early as can be: it is waited for
         with self._watch.time("record"):
-            self._split_recording(seen)
             self._recording.observe(frame, seen.number, guarded.observation, phase=phase.value)
             self._record(shapes)
+        if tracked.lost and self._surface:
+            self._order.end(self._surface)
         if shapes and shapes[-1].index == seen.index and len(shapes) == 1:  # no frames have waited for a model
             self._watch.arrived(seen.read_s)
         self._watch.add(seen.stage_ms)
@@ -183,23 +182,22 @@ class Session:
     def _end_object(self, *, last: bool) -> None:
         """Record the shapes that are left and the summary, and save the files asked for.
 
-        Raises:
-            ReconstructionError: the last object has too few frames for a rest shape, and nobody interrupted it.
-            UsageError: a stage has ended; all that is known is saved before.
+        Raises a ReconstructionError where the last object has no rest shape, a UsageError where a stage has ended.
         """
         try:
-            with completed():
-                self._record(self._object.finish())
-        except KeyboardInterrupt:
-            self.interrupted = True
-        except (ReconstructionError, UsageError) as error:
-            if last and not self.interrupted:
-                raise
-            self._progress.log(in_a_line(error))
-        if last:
-            self._order.end(self._surface)
-            self._watch.stop()
-        try:
+            try:
+                with completed():
+                    self._record(self._object.finish())
+            except KeyboardInterrupt:
+                self.interrupted = True
+            except (ReconstructionError, UsageError) as error:
+                if last and not self.interrupted:
+                    self.interrupted = isinstance(error, UsageError)
+                    raise
+                self._progress.log(in_a_line(error))
+            if last:
+                self._order.end(self._surface)
+                self._watch.stop()
             if self._wanted_again and not self.interrupted:
                 self.interrupted = final_pass(self._object, self._recording, self._progress)
         finally:
@@ -207,15 +205,18 @@ class Session:
                 self._save(last=last)
 
     def _save(self, *, last: bool) -> None:
-        """Record the summary of what is known; at last, write the files asked for."""
-        self.summary = self._summary(self._first_object)
-        self._recording.tell("summary", self._summary(self._object).as_dict())
-        if self._surface is not None:
-            self._recording.tell("modes", *self._object.surface.recorded[:2])
-            self._recording.tell("truth", self._object.true_shapes())
-        self._others.keep(self._object)
-        if last:
-            self._others.save()
+        """Record the summary of what is known; at last, write the files asked for. A run that failed leaves nothing."""
+        if self._surface is None and last and not self.interrupted:
+            return
+        with ExitStack() as files:  # are written, whatever the rest fails at
+            if last:
+                files.callback(self._others.save)
+            files.callback(self._others.keep, self._object)
+            self.summary = self._summary(self._first_object)
+            self._recording.tell("summary", self._summary(self._object).as_dict())
+            if self._surface is not None:
+                self._recording.tell("modes", *self._object.surface.recorded[:2])
+                self._recording.tell("truth", self._object.true_shapes())
 
     def _go_on_with(self, tracked: TrackedObject, text: str, frame: Seen) -> None:
         """From this frame on another object is followed, in a recording of its own."""
@@ -230,6 +231,7 @@ class Session:
         """Go on in another file, if it is time, and no frame of this one waits for its shape."""
         if self._surface and not self._object.reconstruction.behind and self._parts.due(frame.time_s):
             self._recording.tell("summary", self._summary(self._object).as_dict())
+            self._recording.tell("modes", *self._surface.recorded[:2])
             self._open_part(frame)
             self._recording.tell("rest", *self._surface.recorded)
 

@@ -70,8 +70,7 @@ class TrackedObject:
             self._texture = first_picture(config.texture)
         height, width = first.image.shape[:2]
         self.reconstruction = estimator(config, (width, height), points_px, start, frames)
-        self.lost, self.alike = False, 1.0
-        self.since = self.last = first.index
+        self.lost, self.alike, self.since, self.last = False, 1.0, first.index, first.index
         self.recordings: list[Path] = []
         self._astray = np.zeros(len(points_px), np.bool_)
         self._times: dict[int, float] = {}  # of frames that have no shape yet: source frame → seconds
@@ -135,8 +134,7 @@ class TrackedObject:
             self._astray |= seen.astray
         if seen.change is not Change.NONE:
             self.lost = seen.change is Change.LOST
-        if not self.lost:
-            self.alike = seen.observation.alike
+        self.alike = self.alike if self.lost else seen.observation.alike
         if seen.change is Change.RECOVERED:  # nothing ties it to where it was
             self.reconstruction.restart()
         return seen
@@ -167,23 +165,27 @@ class TrackedObject:
 
     def revised(self) -> Iterator[FrameShape]:
         """The shapes of all frames once more, with a last map; none where that tells nothing new."""
-        stored = self._stored
-        if stored is None or not self.config.passes:
+        stored = self._stored if self.config.passes else None
+        if stored is None or not self.reconstruction.revise(
+            self._on_surface(one.observation) for one in stored if not one.lost
+        ):
             return
-        if not self.reconstruction.revise(self._on_surface(one.observation) for one in stored if not one.lost):
-            return
-        self.online, self.collected = self.collected, self._nothing()
-        lost = False
-        for one in stored.told_ahead(lambda some: self.reconstruction.foresee([*map(self._on_surface, some)])):
-            if one.lost:
-                self.collected.lose(one.index)
-                lost = True
-                continue
-            if lost:
-                self.reconstruction.restart()
-                lost = False
-            self._times[one.index] = one.time_s
-            yield from self._of_frames(self.reconstruction.update(*self._on_surface(one.observation)))
+        before, lost = self.collected, False
+        self.online, self.collected = before, self._nothing()
+        try:
+            for one in stored.told_ahead(lambda some: self.reconstruction.foresee([*map(self._on_surface, some)])):
+                if one.lost:
+                    self.collected.lose(one.index)
+                    lost = True
+                    continue
+                if lost:
+                    self.reconstruction.restart()
+                    lost = False
+                self._times[one.index] = one.time_s
+                yield from self._of_frames(self.reconstruction.update(*self._on_surface(one.observation)))
+        except BaseException:  # not all frames: those of before are complete
+            self.online, self.collected = None, before
+            raise
 
     def _on_surface(self, seen: Observation) -> tuple[Array, Flags]:
         """Points (2, P) px, and which of them are seen (P,) and on the surface."""
@@ -200,8 +202,7 @@ class TrackedObject:
     @property
     def mm_per_px(self) -> float | None:
         """Millimetres in a pixel of the first frame, if a length is known."""
-        known = self.collected.ruler
-        rest = self.reconstruction.rest
+        known, rest = self.collected.ruler, self.reconstruction.rest
         return known.mm_per_px(along=rest is None or rest.kind != "rigid") if known else None
 
     def true_shapes(self) -> dict[int, Array]:
@@ -236,15 +237,14 @@ class TrackedObject:
         """No estimates yet."""
         truth_frames = frozenset(self._truth.frames.tolist()) if self._truth else frozenset()
         ends = None if self.config.between is None else np.reshape(self.config.between, (2, 2))
-        size_mm = self.config.size_mm if self.number == 0 else None  # nobody knows another object's
+        size_mm = None if self.number else self.config.size_mm  # nobody knows another object's
         known = None if size_mm is None else ruler(size_mm, ends, self.points_px)
         return Collected(self.config.output.shapes_out is not None, truth_frames, ruler=known)
 
     def _of_frames(self, estimates: list[ShapeEstimate]) -> list[FrameShape]:
         """Estimates with the oldest frames that wait for one."""
         shapes = []
-        for estimate in estimates:
-            index = next(iter(self._times))
+        for index, estimate in zip([*self._times], estimates, strict=False):
             shapes.append(FrameShape(index, self._times.pop(index), estimate))
             self.collected.add(index, estimate)
         return shapes

@@ -1,7 +1,7 @@
 """The frames of a recording: where its points were seen in them, and their estimates by one model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -79,6 +79,7 @@ class Estimates:
         s: (F,).
         Lambda: (F, 3, r) px.
         sigma: (F, P) standard deviations of the vertices; NaN if they were not asked for.
+        before: of rows that an earlier model was made for, that model and the one row as it was shown.
     """
 
     quaternion: Array
@@ -86,25 +87,32 @@ class Estimates:
     s: Array
     Lambda: Array
     sigma: Array
+    before: "dict[int, tuple[Model, Estimates]]" = field(default_factory=dict)
 
     def scaled(self, factor: float) -> "Estimates":
         """The same in other units of the rest shape."""
-        return replace(self, s=self.s / factor, Lambda=factor * self.Lambda, sigma=factor * self.sigma)
+        before = {i: (model.scaled(factor), one.scaled(factor)) for i, (model, one) in self.before.items()}
+        return replace(self, s=self.s / factor, Lambda=factor * self.Lambda, sigma=factor * self.sigma, before=before)
 
     def of(self, i: int, model: Model, W: Array, visible: Flags) -> ShapeEstimate:
-        """Shape and pose of row i, by the model they are of; W (2, P) px, visible (P,)."""
+        """Shape and pose of row i, by the model they were made for; W (2, P) px, visible (P,)."""
+        sigma = self.sigma[i] if np.isfinite(self.sigma[i]).all() else None
+        if i in self.before:
+            earlier, one = self.before[i]
+            return replace(one.of(0, earlier, W, visible), sigma=sigma)
         q = quaternion_from_rotation(rotation_from_quaternion(self.quaternion[i]) @ model.basis.Phi)
         t, log_s = self.t[i] / model.radius_px, np.log(self.s[i] / model.scale)
         state = State(q[None], t[None], np.array([log_s]), self.Lambda[i][None] / model.unit)
-        sigma = self.sigma[i] if np.isfinite(self.sigma[i]).all() else None
         return replace(model.estimate(i, W, visible, state), sigma=sigma)
 
 
 def read_estimates(rows: Rows, entity: str, frames: Sequence[int], models: Sequence[Model]) -> Estimates:
-    """The estimates of frames by the last model; what was shown by an earlier one is as near as this comes to it."""
+    """The estimates of frames by the last model; what an earlier one showed as near as this comes to it, and as it was."""
     modes = [len(model.basis.eigenvalues) for model in models] or [0]
     points = models[-1].basis.rest.shape[1] if models else 0
-    found = Estimates(*(np.full((len(frames), *size), np.nan) for size in ((4,), (2,), (), (3, modes[-1]), (points,))))
+    rows_of = ((4,), (2,), (), (3, modes[-1]), (points,))
+    q, t, s, Lambda, sigma = (np.full((len(frames), *size), np.nan) for size in rows_of)
+    found = Estimates(q, t, s, Lambda, sigma)
     unsure = rows.last(entity, f"{ESTIMATE}sigma")
     values = {name: rows.last(entity, f"{ESTIMATE}{name}") for name in ("quaternion", "t", "s", "Lambda", "model")}
     if not models:
@@ -120,6 +128,7 @@ def read_estimates(rows: Rows, entity: str, frames: Sequence[int], models: Seque
         model = models[int(number[0])]
         if model is not models[-1]:
             single = Estimates(q[None], t[None], s, Lambda.reshape(1, 3, -1), np.full((1, points), np.nan))
+            found.before[i] = model, single
             nothing = np.zeros(model.basis.rest.shape[1], np.bool_)
             seen = translated(models[-1], model, single.of(0, model, np.zeros((2, len(nothing))), nothing))
             q, t, s, Lambda = seen.quaternion, seen.t, np.array([seen.s]), seen.Lambda

@@ -31,9 +31,7 @@ def blueprint(*, live: bool = False) -> rrb.Blueprint:
                     contents=[f"+ /{entities.MESH}", f"+ /{entities.CAMERA}", f"+ /{entities.TRUTH}"],
                     overrides={entities.MESH: untextured()},
                     background=BACKGROUND,
-                    line_grid=rrb.LineGrid3D(
-                        plane=rr.components.Plane3D((0, 1, 0), FLOOR), spacing=0.5, color=(70, 74, 84)
-                    ),
+                    line_grid=grid(),
                     eye_controls=eye((3.4, -2.3, -2.6)),
                 ),
                 row_shares=[3, 2],

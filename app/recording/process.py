@@ -122,10 +122,10 @@ class RecordingProcess:
 
     Args:
         begun: the process and the connection to it; None writes nothing.
-        pictures: where the pictures of frames are, if they are not told; each is released when it is written.
+        pictures: where the pictures of frames are; each is released when it is written.
     """
 
-    def __init__(self, begun: "tuple[subprocess.Popen[bytes], Connection] | None", pictures: Ring | None = None) -> None:
+    def __init__(self, begun: "tuple[subprocess.Popen[bytes], Connection] | None", pictures: Ring) -> None:
         self._error: BaseException | None = None
         self._waiting: Queue[Call | None] = Queue(MOST_WAITING)
         self._process: subprocess.Popen[bytes] | None = None
@@ -135,6 +135,7 @@ class RecordingProcess:
         self._process, self._connection = begun
         self._sender = Thread(target=self._send, name="record", daemon=True)
         self._sender.start()
+        Thread(target=self._outlive, args=(self._process,), daemon=True).start()
 
     def tell(self, method: str, *arguments: object, **named: object) -> None:
         """Call a method of the recording, later."""
@@ -144,9 +145,6 @@ class RecordingProcess:
 
     def observe(self, frame: Frame, number: int, *arguments: object, **named: object) -> None:
         """The picture is left where it is."""
-        if self._pictures is None:
-            self.tell("observe", frame, *arguments, **named)
-            return
         self._raise()
         if self._process is not None:
             self._waiting.put(("observe", (replace(frame, image=NO_PICTURE), *arguments), named, number))
@@ -181,7 +179,7 @@ class RecordingProcess:
         """Send what waits; the first thing that goes wrong is kept for the run's own thread."""
         calls = iter(self._waiting.get, None)
         try:
-            self._connection.send(self._pictures and self._pictures.size)
+            self._connection.send(self._pictures.size)
             for call in calls:
                 self._connection.send_bytes(pickle.dumps(call, protocol=5))
                 while self._connection.poll():
@@ -191,22 +189,22 @@ class RecordingProcess:
                 pass
         except Exception as error:
             gone = "the process that writes the recording has ended: the memory or the disk may be full"
-            self._fail(UsageError(gone) if isinstance(error, OSError | EOFError) else error)
+            self._error = self._error or (UsageError(gone) if isinstance(error, OSError | EOFError) else error)
             self._connection.close()  # the process completes the file
-            if self._pictures is not None:
-                self._pictures.release_all()
+            self._pictures.release_all()
             for _ in calls:  # the run does not wait for what nobody reads
                 pass
+
+    def _outlive(self, process: "subprocess.Popen[bytes]") -> None:
+        """When the process has ended, however that was, nobody is to wait for it to release pictures."""
+        process.wait()
+        self._pictures.release_all()
 
     def _receive(self) -> bool:
         """Whether more is to come."""
         error = self._connection.recv()
-        if error is not None:
-            self._fail(error)
-        return error is not None
-
-    def _fail(self, error: BaseException) -> None:
         self._error = self._error or error
+        return error is not None
 
     def _raise(self) -> None:
         error, self._error = self._error, None
@@ -225,20 +223,20 @@ def main() -> None:
     recordings = Recordings()
     method = ""
     try:
-        size = connection.recv()
-        pictures = Ring(inherited_file(2), size) if size else None
+        pictures = Ring(inherited_file(2), connection.recv())
         while method != "leave":
             signal.alarm(0)
             data = connection.recv_bytes()
             method, arguments, named, number = cast(Call, pickle.loads(data))
-            signal.alarm(0 if method == "leave" else HANGS_S)  # ends the process; completing may take longer
-            if pictures is not None and number is not None:
+            # Ends the process. To complete a file, or to convert a video that is stored in it, may take longer.
+            signal.alarm(0 if method in ("open", "leave") else HANGS_S)
+            if number is not None:
                 arguments = (replace(arguments[0], image=pictures.picture(number)), *arguments[1:])
             try:
                 recordings.call(method, *arguments, **named)
             except Exception as error:  # raised in the run's process
                 connection.send(error)
-            if pictures is not None and number is not None:
+            if number is not None:
                 pictures.release(number)
         connection.send(None)
     except (EOFError, OSError):  # the run was killed: what it told until then is written

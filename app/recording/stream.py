@@ -81,7 +81,10 @@ class Stream:
         if self._stream is not None and self._columns.rows >= self._batch:
             self._sends += 1
             if self._sends % self._flushed_after:
-                self._send(self._stream)
+                try:
+                    self._send(self._stream)
+                except RuntimeError as error:
+                    raise self._failure(error) from error
             else:  # a full disk is noticed
                 self._flush(self._stream)
                 if self._file is not None:

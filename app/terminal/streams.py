@@ -39,12 +39,7 @@ class Unheard:
 
 
 def prepare() -> None:
-    """Open what is closed, so that no file takes its number; letters that a terminal lacks become question marks."""
-    for number in range(3):
-        try:
-            os.fstat(number)
-        except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+    """Letters that a terminal lacks become question marks, and nobody need read what is written."""
     sys.stdout = sys.stdout or os.fdopen(1, "w")
     sys.stderr = sys.stderr or os.fdopen(2, "w")
     for stream in (sys.stdout, sys.stderr):

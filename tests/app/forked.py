@@ -12,6 +12,7 @@ from contextlib import suppress
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
+from threading import Lock
 
 from app.environment import environment
 
@@ -22,10 +23,15 @@ class Forked:
     """A forked process, as far as a process is used: it has ended when nobody holds the pipe's other end."""
 
     def __init__(self, lifeline: int) -> None:
-        self._lifeline = lifeline
+        self._lifeline, self._beginning, self._ending = lifeline, Lock(), Lock()
+
+    @property
+    def pid(self) -> int:
+        with self._beginning:
+            return self._pid
 
     @cached_property
-    def pid(self) -> int:
+    def _pid(self) -> int:
         return int(os.read(self._lifeline, 16))
 
     def kill(self) -> None:
@@ -35,11 +41,12 @@ class Forked:
             os.kill(self.pid, signal.SIGKILL)
 
     def wait(self) -> None:
-        if self._lifeline >= 0:
-            while os.read(self._lifeline, 16):
-                pass
-            os.close(self._lifeline)
-        self._lifeline = -1
+        with self._ending:
+            if self._lifeline >= 0 and self.pid:
+                while os.read(self._lifeline, 16):
+                    pass
+                os.close(self._lifeline)
+            self._lifeline = -1
 
 
 @cache

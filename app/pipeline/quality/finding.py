@@ -13,8 +13,3 @@ class Verdict:
 
     grade: Grade
     reason: str
-
-    @property
-    def line(self) -> str:
-        """`poor: 4.5 px from frame 115 on; …`."""
-        return f"{self.grade}: {self.reason}"

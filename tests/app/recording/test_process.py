@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from app.playback.playback import Playback
-from app.processes.child import child
+from app.processes.child import child, shared_file
+from app.processes.ring import Ring
 from app.recording.process import MOST_WAITING, RecordingProcess
 from app.terminal.errors import UsageError
 from tests.synthetic_run import SIZE, Run, verify, write_run
@@ -24,7 +25,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 
 def opened(path: Path, **options: object) -> RecordingProcess:
-    recording = RecordingProcess(child("app.recording.process"))
+    file = shared_file()
+    recording = RecordingProcess(child("app.recording.process", file), Ring(file, SIZE))
     recording.tell("open", path, configuration={}, size=SIZE, **options)
     return recording
 
@@ -89,7 +91,7 @@ def test_it_loads_no_command_line_and_draws_no_figures() -> None:
 
 
 def test_what_nobody_reads_needs_no_process(run: Run) -> None:
-    recording = RecordingProcess(None)
+    recording = RecordingProcess(None, Ring(shared_file(), SIZE))
     assert recording._process is None
     tell(recording, run)
     recording.close()
