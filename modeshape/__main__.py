@@ -29,7 +29,7 @@ def begin() -> NoReturn:
         sys.stderr.write("error: the current folder is gone: change to another\n")
         sys.exit(2)
     from app.environment import environment
-    from app.processes.descriptors import hold
+    from app.standard_files import hold
 
     hold()
     os.environ.update(environment())

@@ -66,20 +66,17 @@ class SlidingWindow:
     ) -> None:
         self.model = model
         self.state: State | None = None
-        self._energy = guide or energy
-        self._shown = energy if guide else None
-        self._length, self._motion = length, motion
+        self._energy, self._shown = guide or energy, energy if guide else None
+        self._length, self._motion, self._uncertainty = length, motion, uncertainty
         self._pull = self._energy.rest
         self._misfit: float | None = None  # mean squared, running mean
         self._usual: float | None = None  # energy of a new frame, running mean
         self._before: Previous | None = None  # the frame that has left the window
         self._lost: State | None = None  # the last frame before a restart
         self._data: list[Statistics] = []
-        self.frames = 0
+        self.frames, self._refine = 0, refine
         self._rest = Refinement(len(model.basis.eigenvalues))
-        self._refine = refine
         self._switch: Switch | None = None  # of the newest frame
-        self._uncertainty = uncertainty
 
     def advance(self, W: Array, visible: Mask, expected: State | None = None) -> ShapeEstimate:
         """Add the next frame's points (2, p) px and adjust the window; returns the newest frame's shape.
@@ -120,9 +117,8 @@ class SlidingWindow:
     def _near(self, W: Array, visible: Mask, expected: State) -> ShapeEstimate:
         """The next frame by itself, near to what is expected."""
         self.frames += 1
-        data = image_statistics(
-            self.model, W, robust_weights(self.model.residuals(W, expected) / self.model.radius_px, visible)
-        )
+        weights = robust_weights(self.model.residuals(W, expected) / self.model.radius_px, visible)
+        data = image_statistics(self.model, W, weights)
         energy = Energy(rest=EXPECTED, centre=expected.Lambda[0], rows=self._energy.rows, tied=False)
         found = one_step(energy, data, expected)
         # The frame before stays for the prediction.
@@ -158,9 +154,8 @@ class SlidingWindow:
     def _started(self, W: Array, weights: Array) -> State:
         """The window with the new frame as it starts, of at most its length."""
         if self.state is None:
-            if self._lost is not None and (weights > RELIABLE).sum() < FEWEST_POINTS:
-                return self._lost
-            return self._alone(W, weights)
+            few = (weights > RELIABLE).sum() < FEWEST_POINTS
+            return self._lost if self._lost is not None and few else self._alone(W, weights)
         window = join([self.state, off_the_saddle(self.state[-1:], self.model)])
         return self._without_oldest(window) if len(window) > self._length else window
 

@@ -2,6 +2,11 @@
 
 import json
 import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import cv2
@@ -54,3 +59,40 @@ def test_python_path_with_the_current_folder(folder: Path, video: Path, monkeypa
     monkeypatch.setitem(command_line.ENVIRONMENT, "PYTHONPATH", path)
     done = in_own_process(folder, "run", video, *OPTIONS, "--frames", ":10")
     assert done.code == 0, done.err
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_a_script_that_leaves_its_video_half_way_ends(tmp_path: Path, video: Path, recorded: bool) -> None:
+    code = (
+        "import sys, modeshape\n"
+        "where = {'recording': 'run.rrd'} if sys.argv[2:] else {}\n"
+        "frames = modeshape.reconstruct(sys.argv[1], points=60, settings=modeshape.Settings(modes=5), **where)\n"
+        "next(frames)\n"
+    )
+    command = [sys.executable, "-c", code, str(video), *["recorded"] * recorded]
+    done = subprocess.run(command, cwd=tmp_path, env=command_line.ENVIRONMENT, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, "Exception" in done.stderr) == (0, False), done.stderr
+    if recorded:
+        verify(tmp_path / "run.rrd")
+
+
+@pytest.mark.parametrize("closed", [0, 1])
+def test_a_run_without_standard_files(tmp_path: Path, video: Path, closed: int) -> None:
+    command = [sys.executable, "-m", "modeshape", "run", str(video), *OPTIONS, "--out", "run.rrd"]
+    shell = f"exec {shlex.join(command)} {closed}{'<' if closed == 0 else '>'}&-"
+    done = subprocess.run(["bash", "-c", shell], cwd=tmp_path, env=command_line.ENVIRONMENT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert len(done.stderr) < 5000
+    verify(tmp_path / "run.rrd")
+
+
+@pytest.mark.parametrize("after_s", [0.1, 0.25])
+def test_ctrl_c_before_anything_has_begun(tmp_path: Path, video: Path, after_s: float) -> None:
+    command = [sys.executable, "-m", "modeshape", "run", str(video), *OPTIONS, "--frames", ":10"]
+    with subprocess.Popen(command, cwd=tmp_path, env=command_line.ENVIRONMENT, stderr=subprocess.PIPE, text=True) as run:
+        time.sleep(after_s)
+        run.send_signal(signal.SIGINT)
+        _, told = run.communicate(timeout=60)
+    assert run.returncode in (130, -signal.SIGINT)  # the latter before Python itself had begun
+    assert run.returncode == 130 or after_s < 0.2
+    assert "modeshape" not in told.split("Traceback")[-1] or "Traceback" not in told
