@@ -52,7 +52,7 @@ class Recording:
 
     @cached_property
     def shapes(self) -> NDArray[np.float64]:
-        """(F, P, 3) in camera axes, in pixels of the first frame; NaN in frames without one.
+        """(F, P, 3) in camera axes, in pixels of the first frame, or millimetres with --size-mm; NaN in frames without one.
 
         Raises:
             ValueError: the run ended before its rest shape was found; so for what follows but the images.

@@ -211,7 +211,7 @@ class Playback:
         return self.estimates.of(i, model, self.W[i], self.visible[i]) if self.shaped[i] else None
 
     def shapes(self) -> Array:
-        """All shapes (F, 3, P) in camera axes, pixels of the first frame; NaN in frames without one.
+        """All shapes (F, 3, P) in camera axes, pixels of the first frame, or mm; NaN in frames without one.
 
         Raises:
             UsageError: the run ended before there was a model.

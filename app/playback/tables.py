@@ -48,12 +48,13 @@ def write_npz(playback: Playback, file: BinaryIO, advance: Callable[[], None]) -
         advance()
     basis, camera, sigma = playback.basis, playback.camera, playback.estimates.sigma[rows]
     camera_R, camera_position = camera_path(playback, rows)
+    own = np.isin(rows, [*playback.estimates.before], invert=True)[:, None, None]  # not of another model
     arrays: dict[str, Any] = {
         "S": shapes,
-        "R": camera_R.transpose(0, 2, 1),
+        "R": np.where(own, camera_R.transpose(0, 2, 1), np.nan),
         "s": playback.estimates.s[rows],
         "t": playback.estimates.t[rows],
-        "Lambda": playback.estimates.Lambda[rows],
+        "Lambda": np.where(own, playback.estimates.Lambda[rows], np.nan),
         "visible": playback.visible[rows],
         "frames": playback.frames[rows],
         "faces": playback.mesh.faces,
