@@ -94,6 +94,7 @@ def measures(playback: Playback) -> Measures:
 def per_frame(one: Reviewed) -> dict[str, list[object]]:
     """Columns with one entry per frame; NaN as None."""
     playback, poses, measured = one.playback, one.playback.estimates, one.measured
+    unit = "mm" if playback.unit == "millimetres" else "px"
     numbers: dict[str, Array] = {
         "visible_share": measured.visible_share,
         "error_rms_px": measured.rms_px,
@@ -101,7 +102,7 @@ def per_frame(one: Reviewed) -> dict[str, list[object]]:
         **{f"error_{name}_px": measured.errors(q) for name, q in (("median", 50), ("p95", 95), ("max", 100))},
         **{f"{stage}_ms": values for stage, values in playback.stage_ms.items()},
         **dict(zip(PARAMETERS, (*poses.quaternion.T, *poses.t.T, poses.s), strict=True)),
-        **{f"Lambda_{row}_px": np.linalg.norm(poses.Lambda[:, k], axis=1) for k, row in enumerate(ROW_NAMES)},
+        **{f"Lambda_{row}_{unit}": np.linalg.norm(poses.Lambda[:, k], axis=1) for k, row in enumerate(ROW_NAMES)},
     }
     return {
         "recording": [one.label] * len(playback.frames),
