@@ -25,7 +25,7 @@ class Reconstruction:
         settings: how to reconstruct.
 
     Raises:
-        ValueError: settings that do not go together.
+        ValueError: settings that do not go together, or no focal length.
 
     >>> import numpy as np, modeshape
     >>> tracks = np.load("tracks.npy")  # (F, P, 2), NaN where a point is not seen
@@ -37,6 +37,8 @@ class Reconstruction:
     """
 
     def __init__(self, size: tuple[int, int], *, focal_px: float | None = None, settings: Settings | None = None) -> None:
+        if focal_px is not None and not focal_px > 0:
+            raise ValueError(f"focal_px {focal_px} is no focal length: give pixels, more than 0")
         settings = replace(settings or Settings(), estimate_focal=focal_px is None)
         self._estimator = online.Reconstruction(picture_camera(size, focal_px), settings)
         self._waiting: list[NDArray[np.float64]] = []
@@ -59,6 +61,8 @@ class Reconstruction:
             ValueError: no rest shape can be found in the frames so far.
         """
         points = np.asarray(points_px, np.float64)
+        if points.ndim != 2 or points.shape[1] != 2:
+            raise ValueError(f"points_px has the shape {points.shape}, but (points, 2) is needed")
         seen = np.isfinite(points[:, 0] + points[:, 1])
         if visible is not None:
             seen &= visible
@@ -74,7 +78,10 @@ class Reconstruction:
             ValueError: no rest shape can be found in them.
         """
         with self._threads.limit(limits=1):
-            return self._known(self._estimator.finish())
+            known = self._known(self._estimator.finish())
+        if self._waiting:
+            raise ValueError("no rest shape can be found: no frame shows enough points")
+        return known
 
     def _known(self, estimates: list[ShapeEstimate]) -> list[Estimate]:
         known = []

@@ -75,9 +75,11 @@ def reconstruct(
     (69, (120, 3), (120,))
     """
     settings = settings or Settings()
+    if region is not None and len(region) != 4:
+        raise ValueError(f"region {region} has {len(region)} numbers: give x, y, width, height")
     config = Run(
         source=str(source),
-        roi=region,
+        roi=region and (round(region[0]), round(region[1]), round(region[2]), round(region[3])),
         mask=None if mask is None else Path(mask),
         frames=f"{frames[0]}:{'' if frames[1] is None else frames[1]}",
         points=points,

@@ -15,6 +15,13 @@ USUAL_MODES = 20
 MORE_MODES = 40  # of what deforms and is seen well
 MOST_MODES = 80  # of solids that deform, when time is no matter
 PriorName = Literal["rest", "smoothness", "rotation", "scale", "inextensibility"]
+EnergyName = Literal["anchored", "paper"]
+CHOICES = {  # of Settings
+    "rest_shape": get_args(RecoveredRestShape),
+    "metric": ("auto", *get_args(Metric)),
+    "deformation": get_args(Deformation),
+    "energy": get_args(EnergyName),
+}
 
 
 @dataclass(frozen=True)
@@ -42,7 +49,7 @@ class Settings:
     nearly keeping its lengths. Auto: general for a solid rest shape, inextensible for a flat one."""
     window: int = 3
     """Frames adjusted together."""
-    energy: Literal["anchored", "paper"] = "anchored"
+    energy: EnergyName = "anchored"
     """Anchored: tied to the past and pulled to rest. Paper: the paper's section 5 as printed (orthographic)."""
     priors: Mapping[str, float] = field(default_factory=dict, hash=False)
     """Weights of the energy's priors instead of its own, 0 for none: rest, smoothness, rotation, scale,
@@ -67,6 +74,9 @@ class Settings:
         return self.rest_shape if self.rest_shape in ("solid", "sheet") else None
 
     def __post_init__(self) -> None:
+        for name, choices in CHOICES.items():
+            if (value := getattr(self, name)) not in choices:
+                raise ReconstructionError(f"{name} {value!r} is unknown: choose from {', '.join(choices)}", name)
         if self.bootstrap_frames != "auto" and self.bootstrap_frames < 2:
             problem = f"bootstrap_frames {self.bootstrap_frames} is too few: give auto, or 2 and more"
             raise ReconstructionError(problem, "bootstrap_frames")

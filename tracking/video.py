@@ -15,20 +15,12 @@ import cv2
 import numpy as np
 
 from tracking import Image, TrackingError
-from tracking.sources.capture import (
-    Log,
-    Reconnecting,
-    announced_frames,
-    as_bgr,
-    is_camera,
-    open_capture,
-    probe,
-)
+from tracking.sources.capture import Log, Reconnecting, announced_frames, as_bgr, is_camera, open_capture, probe
 
 DEFAULT_FPS = 30.0  # of sources that do not tell
 DECODE_AHEAD = 4  # frames waiting in the queue: enough to hide decoding, little memory
 LATE_S = 0.05  # frames of a live source that have waited for longer may be dropped: a short stall costs none
-BROKEN_FRAMES = 30  # so many unreadable frames in a row end the source
+BROKEN_FRAMES = 300  # so many unreadable frames in a row, some ten seconds, end the source
 
 
 @dataclass(frozen=True)
@@ -83,12 +75,11 @@ class Video:
         log: Log = lambda _: None,
     ) -> None:
         if first < 0 or (stop is not None and stop <= first):
-            raise TrackingError(
-                f"no frame in the range {first}:{'' if stop is None else stop}; ask for A:B with 0 <= A < B"
-            )
+            asked = f"{first}:{'' if stop is None else stop}"
+            raise TrackingError(f"no frame in the range {asked}; ask for A:B with 0 <= A < B")
         self.source = source
-        self._stop, self._duration_s = stop, duration_s
-        self._closing = threading.Event()
+        self._stop, self._duration_s, self._log = stop, duration_s, log
+        self._closing, self._delivered = threading.Event(), 0
         probed = probe(source) if Path(source).is_file() else None
         self._capture = open_capture(source, self._closing, log, decodes=probed is None or probed.decodes)
         self.live = is_camera(source) or isinstance(self._capture, Reconnecting)
@@ -97,8 +88,7 @@ class Video:
             raise TrackingError(f"{source} is no camera or stream: frames of a file are never late", "drop_late")
         self._drop_late = drop_late
         self._began = monotonic()
-        self._index = 0  # of the next frame grabbed
-        self._time_s = -np.inf
+        self._index, self._time_s = 0, -np.inf  # of the next frame grabbed, of the last delivered
         self._timed = probed is not None and probed.times_rise
         fps = self._capture.get(cv2.CAP_PROP_FPS)
         self.fps = fps if 0.5 < fps < 1000.0 else DEFAULT_FPS
@@ -107,7 +97,7 @@ class Video:
             self._skip_to(first)
             frame = self._read()
             if frame is None:
-                raise self._nothing_left()
+                raise self._nothing_left(first)
         except BaseException:
             self._capture.release()
             raise
@@ -164,9 +154,18 @@ class Video:
         try:
             while frame is not None and self._put(frame):
                 frame = self._read()
+            self._tell_missing()
             self._put(None)
         except BaseException as error:  # handed to the thread that iterates
             self._put(error)
+
+    def _tell_missing(self) -> None:
+        """Say how many of the frames there should have been could not be read."""
+        if self._announced is None or self._duration_s is not None or self._closing.is_set():
+            return
+        due = min(self._announced, self._stop or self._announced) - self._first.index
+        if self._delivered < due - 1:  # containers are off by one
+            self._log(f"{due - self._delivered} of {due} frames cannot be read, and are left out: {self.source} is damaged")
 
     def _put(self, item: Frame | BaseException | None) -> bool:
         if self._drop_late and isinstance(item, Frame):
@@ -182,7 +181,7 @@ class Video:
         # Not by seeking: containers miss the frame by up to a group of pictures.
         while self._index < first:
             if not self._grab():
-                raise self._nothing_left()
+                raise self._nothing_left(first)
             self._index += 1
 
     def _grab(self) -> bool:
@@ -225,11 +224,14 @@ class Video:
         if not np.isfinite(time_s) or time_s <= self._time_s:
             time_s = self._time_s + 1.0 / self.fps if self._index > 0 else 0.0
         self._time_s = time_s
+        self._delivered += 1
         frame = Frame(self._index, time_s, image)
         self._index += 1
         return frame
 
-    def _nothing_left(self) -> TrackingError:
+    def _nothing_left(self, first: int) -> TrackingError:
+        if 0 < first < (self._announced or 0) - 1:  # containers are off by one
+            return TrackingError(f"frame {first} of {self.source} cannot be read; ask for another")
         if self._index > 0:
             return TrackingError(f"{self.source} ends at frame {self._index}; ask for frames before it")
         code = int(self._capture.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little", signed=True)

@@ -143,6 +143,8 @@ def make_jobs(command: Batch) -> list[Job]:
         digest = hashlib.sha256(os.fsencode(video)).hexdigest()[:8]
         job = Job(video, name, folder, (*options, *own[video]), cores)
         if stems[Path(video).stem] > 1 or (job.report.exists() and job.done() is None):
+            if options or own[video]:
+                digest = hashlib.sha256(os.fsencode("\0".join((video, *job.options)))).hexdigest()[:8]
             job = Job(video, f"{name}-{digest}", folder, job.options, cores)
         found.append(job)
     return found

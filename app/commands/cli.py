@@ -141,7 +141,7 @@ def in_one_line(panel: str) -> str:
     """What a panel of tyro's says, without frame, title, the parser's own names and the repeated help text."""
     rows = [row.strip("│| ") for row in re.sub(r"\x1b\[[0-9;]*m", "", panel).splitlines() if row.strip()[:1] in ("│", "|")]
     sections = [" ".join(part.split()) for part in re.split(r"[─-]{9,}", "\n".join(rows))]
-    what = re.sub(r"^Error parsing \S+: (?=--)", "", sections[0].split(" Got errors:")[0]).rstrip(".")
+    what = re.sub(r"^Error parsing (?:\S+: (?=--)|[A-Z]\w*: )", "", sections[0].split(" Got errors:")[0]).rstrip(".")
     where = re.search(r"modeshape.* --help", sections[-1])
     return f"{what}; see {where.group() if where else 'modeshape --help'}"
 

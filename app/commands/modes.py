@@ -68,7 +68,8 @@ def of_recording(command: Modes, progress: Progress) -> tuple[str, ModalBasis, M
     playback = Playback.load(command.source)
     for note in playback.notes:
         progress.log(note)
-    asked = cast(MetricChoice, playback.configuration.get("metric", "euclidean"))
+    used = (playback.summary or {}).get("metric")  # unknown of a run that was killed
+    asked = cast(MetricChoice, used or playback.configuration.get("metric", "euclidean"))
     return playback.name, playback.basis, playback.mesh, fitting(asked, flat=is_flat(playback.basis.rest))
 
 

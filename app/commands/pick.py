@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from app.arrays import Image
-from app.files.writing import check_free, writable
+from app.files.writing import check_outputs, writable
 from app.options.pick import FramePicture, Pick
 from app.picking.pictures import Pictures
 from app.picking.region import Picked
@@ -60,6 +60,9 @@ def pick(command: Pick, progress: Progress) -> Summary:
         UsageError, TrackingError: a source that cannot be read, or what stands in the way of the run.
     """
     more = words_of("--options", command.options)
+    from app.commands.cli import parse
+
+    parse(["run", command.source, *more])  # a mistake in them is told before anything is drawn
 
     def words(found: Picked) -> str:
         return shlex.join(["modeshape", "run", command.source, *found.options, *more])
@@ -87,7 +90,7 @@ def frame(command: FramePicture, _: Progress) -> Framed:
     Raises:
         UsageError, TrackingError: a source that cannot be read, or a file that cannot be written.
     """
-    check_free(command.out, overwrite=command.overwrite)
+    check_outputs({"--out": command.out}, [Path(command.source)], overwrite=command.overwrite)
     with Video(command.source, command.number, command.number + 1) as video:
         picture = next(iter(video)).image
     height, width = picture.shape[:2]

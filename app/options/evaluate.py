@@ -41,7 +41,7 @@ class Evaluate(Json, Overwrite, FinalPass, FromTracks):
         for name, share in (("missing", self.missing), ("outliers", self.outliers)):
             if not 0 <= share < 1:
                 raise UsageError(f"--{name} {share} is no share: give 0 to less than 1")
-        if self.noise < 0:
+        if not 0 <= self.noise < float("inf"):
             raise UsageError(f"--noise {self.noise} is no noise level: give 0 and more")
         if self.seed < 0:
             raise UsageError(f"--seed {self.seed} is no seed: give 0 and more")

@@ -120,7 +120,7 @@ class Source:
             raise UsageError("--polygon needs three corners and more: give X1 Y1 X2 Y2 X3 Y3 …")
         if self.corners is not None and not convex(self.corners):
             raise UsageError("--corners are not those of a sheet: give its four corners, going round it")
-        if self.duration is not None and not self.duration > 0:
+        if self.duration is not None and not 0 < self.duration < float("inf"):
             raise UsageError(f"--duration {self.duration} is no time: give seconds, more than 0")
         if self.size_mm is not None and not 0 < self.size_mm < float("inf"):
             raise UsageError(f"--size-mm {self.size_mm} is no length: give millimetres, more than 0")

@@ -10,7 +10,7 @@ import cv2
 
 from app.arrays import Image
 from app.pipeline.stages.messages import Footage
-from app.pipeline.stages.working_copy import WorkingCopy
+from app.pipeline.stages.working_copy import SIDE_PX, WorkingCopy
 from tracking.region.mask import region_mask
 from tracking.region.search import Found, search
 from tracking.region.surface import Surface
@@ -49,7 +49,8 @@ def first_look(footage: Footage, video: Video) -> FirstLook:
     if not footage.search or footage.outline is not None:  # drawn by hand
         return FirstLook(frames, video, region, [])
     kept = deque[Frame]()
-    found = copy.found(search(copies(keeping(frames, kept, ends=video.live), copy), copy.picture(region)))
+    small = WorkingCopy(video.size, large_px=2 * SIDE_PX)  # however large the pictures are that points are followed in
+    found = small.found(search(copies(keeping(frames, kept, ends=video.live), small), small.picture(region)))
     if footage.drop_late:
         kept = deque(frame for frame in kept if frame.index >= found.first.index)
         kept = deque(list(kept)[:: len(kept) // LEADING + 1])

@@ -32,9 +32,9 @@ class WorkingCopy:
         kept: (width, height) px of pictures as they are kept.
     """
 
-    def __init__(self, size: tuple[int, int], *, full: bool = False, wide: int = 0) -> None:
+    def __init__(self, size: tuple[int, int], *, full: bool = False, wide: int = 0, large_px: int = LARGE_PX) -> None:
         self._size = size
-        self.factor = max(size) // SIDE_PX if max(size) >= LARGE_PX and not full else 1
+        self.factor = max(size) // SIDE_PX if max(size) >= large_px and not full else 1
         self.size = size[0] // self.factor, size[1] // self.factor
         step = 1 if self.factor == 1 or wide > KEPT_PX else -(-max(size) // KEPT_PX)
         self.kept = size[0] // step, size[1] // step

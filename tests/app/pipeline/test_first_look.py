@@ -118,3 +118,17 @@ def test_a_mesh_of_the_first_object_says_nothing_of_the_next(source: Path, tmp_p
     assert seen is not None
     assert isinstance(seen.objects[1], Begun)
     stage.video.close()
+
+
+def test_motion_in_full_hd_is_no_cut(shared_data: Path, tmp_path: Path) -> None:
+    """The search follows points in pictures of half the width, or most would be lost."""
+    large = tmp_path / "hd.avi"
+    writer = cv2.VideoWriter(str(large), cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (1920, 1440))
+    with Video(str(shared_data / "kinect_paper.mp4"), stop=40) as video:
+        for frame in video:
+            writer.write(cv2.resize(frame.image, (1920, 1440), interpolation=cv2.INTER_CUBIC))
+    writer.release()
+    with Video(str(large)) as video:
+        look = first_look(Footage(str(large)), video)
+        assert next(look.frames).index == 0
+        assert look.region.shape == (1440, 1920)

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tracking import TrackingError
 from tracking.sources.images import missing_numbers
 from tracking.video import Frame, Video
 
@@ -92,3 +93,16 @@ def test_a_percent_sign_in_the_name_is_one(tmp_path: Path) -> None:
     for i in range(3):
         cv2.imwrite(str(tmp_path / f"take 50%_{i:04d}.png"), picture(i))
     assert len(frames(tmp_path / "take 50%_%04d.png")) == 3
+
+
+def test_images_that_cannot_be_read_are_left_out_and_told(tmp_path: Path) -> None:
+    for i in range(60):
+        cv2.imwrite(str(tmp_path / f"img{i:04d}.png"), picture(i % 30))
+    for i in range(10, 50):
+        (tmp_path / f"img{i:04d}.png").write_bytes(b"damaged")
+    told: list[str] = []
+    with Video(str(tmp_path / "img%04d.png"), log=told.append) as video:
+        assert [frame.index for frame in video] == [*range(10), *range(50, 60)]
+    assert "40 of 60 frames cannot be read" in told[-1]
+    with pytest.raises(TrackingError, match=r"frame 20 of .* cannot be read"):
+        Video(str(tmp_path / "img%04d.png"), 20, 21)
