@@ -26,8 +26,8 @@ class Output(Json, Overwrite):
     """Save the shapes as .npz: S (F, 3, P) camera axes, R, s, t, Lambda, faces, visible; those of later objects in
     NAME-object2.npz, …"""
     split_minutes: float | None = None
-    """Start another recording after so many minutes of video: NAME.rrd, NAME-part2.rrd, … Each is complete in itself. With
-    another object, one is started in any case."""
+    """Start another recording after so many minutes of video: NAME.rrd, NAME-part2.rrd, … Each is complete in itself; there
+    is no final pass then. With another object, one is started in any case."""
     keep_online: bool = False
     """Keep the shapes as they were shown on the way in the recording, too: beside those of the final pass."""
     image: Literal["jpeg", "video", "none"] = "jpeg"

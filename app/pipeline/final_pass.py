@@ -11,12 +11,13 @@ def final_pass(tracked: TrackedObject, recording: Recorder, progress: Progress) 
 
     An interrupt waits for the end: a recording has one model for all its frames.
     """
+    told = tracked.notes
     try:
         with completed():
             for count, shape in enumerate(tracked.revised()):
                 if count == 0:
                     recording.tell("final_pass")
-                    for note in tracked.notes:
+                    for note in tracked.notes if tracked.notes != told else ():
                         progress.log(note)
                         recording.tell("event", shape.index, shape.time_s, note)
                     recording.tell("rest", *tracked.surface.recorded)

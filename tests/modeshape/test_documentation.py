@@ -4,11 +4,14 @@ import doctest
 import runpy
 import shutil
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+import modeshape
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -55,3 +58,19 @@ def test_recording_to_numpy(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
 
 def test_every_example_is_run() -> None:
     assert {path.name for path in EXAMPLES.iterdir()} == {"video_to_mesh.py", "own_tracks.py", "recording_to_numpy.py"}
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: modeshape.Reconstruction((640, 480), focal_px=-1), "focal_px -1"),
+        (lambda: modeshape.Reconstruction((640, 480)).update(np.ones((2, 30))), r"has the shape \(2, 30\)"),
+        (lambda: [(r := modeshape.Reconstruction((640, 480))).update(np.ones((3, 2))), r.finish()], "no rest shape"),
+        (lambda: modeshape.Settings(metric="other"), "metric 'other' is unknown: choose from auto, euclidean"),
+        (lambda: modeshape.Settings(deformation="other"), "deformation 'other' is unknown"),
+        (lambda: modeshape.reconstruct("paper.mp4", region=(0, 0, 99)), "give x, y, width, height"),
+    ],
+)
+def test_mistakes_of_callers_are_value_errors(call: Callable[[], object], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        call()

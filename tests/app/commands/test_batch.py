@@ -126,6 +126,13 @@ def test_equal_names_get_recordings_of_their_own(modeshape: Command, videos: Pat
     )
 
 
+def test_each_set_of_options_gets_a_recording_of_its_own(modeshape: Command, videos: Path) -> None:
+    asked = [("batch", videos / "still.mp4", "--out", "out", "--json", f"--options=--frames :{n}") for n in (8, 9, 10, 9)]
+    done = [json.loads(modeshape(*one).out) for one in asked]
+    assert [(one["failed"], one["skipped"]) for one in done] == [(0, 0)] * 3 + [(0, 1)]
+    assert len(list(Path("out").glob("still*.rrd"))) == 3
+
+
 def test_somebody_elses_recording_is_left_alone(modeshape: Command, videos: Path, here: Path) -> None:
     (here / "out").mkdir()
     (here / "out" / "turning.rrd").write_text("precious")

@@ -146,3 +146,15 @@ def test_mistakes_are_told_in_one_line(
 def test_only_png(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"let it end in \.png"):
         Modes(tmp_path / "x.rrd", out=Path("modes.pdf"))
+
+
+def test_the_metric_of_a_recording_is_what_its_run_took(tmp_path: Path, shared_data: Path) -> None:
+    """A bent sheet's modes are chi-squared, though its rest shape is not flat."""
+    out, paper = tmp_path / "paper.rrd", shared_data / "kinect_paper.mp4"
+    summary = Session(
+        Asked(str(paper), roi=(195, 95, 325, 265), frames="0:70", points=150, output=Output(out=out)), Progress()
+    ).run()
+    assert summary.metric == "chi-squared"
+    drawn = modes(Modes(out, out=tmp_path / "modes.png"), Progress())
+    assert drawn.metric == "chi-squared"
+    assert 0.5 < drawn.share <= 1

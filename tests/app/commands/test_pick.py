@@ -48,3 +48,16 @@ def test_corners_that_are_none(modeshape: Command, videos: Path) -> None:
         done = modeshape("run", videos / "turning.mp4", *QUICK, *wrong)
         assert done.code == 2
         assert told in done.err
+
+
+def test_a_mistake_in_the_options_is_told_before_anything_is_drawn(modeshape: Command, videos: Path) -> None:
+    done = modeshape("pick", videos / "still.mp4", "--options=--nope")
+    assert (done.code, "--nope" in done.err) == (2, True)
+
+
+def test_a_picture_does_not_replace_its_source(modeshape: Command, here: Path) -> None:
+    cv2.imwrite("page.png", np.zeros((48, 64, 3), np.uint8))
+    before = Path("page.png").read_bytes()
+    done = modeshape("frame", "page.png", "--out", "page.png", "--overwrite")
+    assert (done.code, "page.png" in done.err) == (2, True)
+    assert (here / "page.png").read_bytes() == before

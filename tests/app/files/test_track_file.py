@@ -240,3 +240,8 @@ def test_pixels_that_are_not_square_become_square(tmp_path: Path) -> None:
     assert tracks.K is not None
     np.testing.assert_allclose(tracks.W[:, 1] - tracks.K[1, 2], W[:, 1] - K[1, 2], atol=1e-9)
     assert tracks.K[0, 0] == tracks.K[1, 1] == K[0, 0]
+
+
+def test_shapes_that_were_estimated_are_no_truth(tmp_path: Path) -> None:
+    path = write(tmp_path, W=W, S=RNG.normal(size=(F, 3, P)), Upsilon=RNG.normal(size=(3, P)))
+    assert load_tracks(path).S_gt is None
