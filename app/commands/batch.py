@@ -133,18 +133,15 @@ def make_jobs(command: Batch) -> list[Job]:
         raise UsageError(f"cannot write to {folder}: {error.strerror}; choose another folder with --out") from error
     options = words_of("--options", command.options)
     own = dict.fromkeys(map(whole, command.videos), ()) | (own_options(command.table) if command.table else {})
-    videos = list(own)
-    stems = Counter(Path(video).stem for video in videos)
+    stems = Counter(map(stem, own))
     at_a_time = command.jobs or os.cpu_count() or 1
     cores = 0 if command.scheduler else max(1, (os.cpu_count() or 1) // at_a_time)
     found = []
-    for video in videos:
+    for video in own:
         name = stem(video)
-        digest = hashlib.sha256(os.fsencode(video)).hexdigest()[:8]
         job = Job(video, name, folder, (*options, *own[video]), cores)
-        if stems[Path(video).stem] > 1 or (job.report.exists() and job.done() is None):
-            if options or own[video]:
-                digest = hashlib.sha256(os.fsencode("\0".join((video, *job.options)))).hexdigest()[:8]
+        if stems[name] > 1 or (job.report.exists() and job.done() is None):
+            digest = hashlib.sha256(os.fsencode("\0".join((video, *job.options)))).hexdigest()[:8]
             job = Job(video, f"{name}-{digest}", folder, job.options, cores)
         found.append(job)
     return found
@@ -174,7 +171,11 @@ def own_options(path: Path) -> dict[str, tuple[str, ...]]:
     for row in rows:
         given = {name: (cell or "").strip() for name, cell in row.items() if name and name != "video"}
         options = [part for name, cell in given.items() if cell for part in option_of(name.strip(), cell)]
-        video = row["video"].strip()
+        video = (row["video"] or "").strip()
+        if not video and any(given.values()):
+            raise UsageError(f"--table {path} has a line without a video: {', '.join(filter(None, given.values()))}")
+        if not video:
+            continue  # spreadsheets write such lines
         found[whole(video if "://" in video else str(path.parent / video))] = tuple(options)
     return found
 

@@ -23,14 +23,14 @@ from reconstruction.settings import Metric, MetricChoice
 
 @dataclass(frozen=True)
 class Drawn(Summary):
-    """What was drawn: the eigenvalues shown, and their share of the sum of all."""
+    """What was drawn: the eigenvalues shown, and their share of the sum of all, where those are known: of few points."""
 
     source: Path
     points: int
     modes: int
     metric: str
     eigenvalues: list[float]
-    share: float
+    share: float | None
     out: Path
 
 
@@ -50,13 +50,14 @@ def modes(command: Modes, progress: Progress) -> Drawn:
         png = modes_figure(basis, mesh, eigenvalues, title=title_of(name, basis, metric), columns=command.columns)
     with writable(command.out) as file:
         file.write(png)
+    whole = len(eigenvalues) > len(basis.eigenvalues)
     return Drawn(
         source=command.source,
         points=basis.rest.shape[1],
         modes=len(basis.eigenvalues),
         metric=metric,
         eigenvalues=basis.eigenvalues.tolist(),
-        share=float(basis.eigenvalues.sum() / eigenvalues.clip(0).sum()),
+        share=float(basis.eigenvalues.sum() / eigenvalues.clip(0).sum()) if whole else None,
         out=command.out,
     )
 

@@ -104,9 +104,12 @@ def reconstruct(command: Retexture, painter: Painter, progress: Progress) -> Run
             progress.expect(summary.frames)
             frames = iter(video)
             for playback in (Playback.load(path) for path in session.recordings):
-                for i, frame in zip(range(len(playback.frames)), frames, strict=False):
+                wanted = playback.frames[0]  # a run leaves out black frames and titles at the beginning
+                recorded = (frame for frame in frames if frame.index >= wanted)
+                for i, frame in zip(range(len(playback.frames)), recorded, strict=False):
                     if i == 0 and playback.recorded_model is not None:
-                        painter.placement = placed(command, playback, painter.placement)
+                        if not painter.begun:
+                            painter.placement = placed(command, playback, painter.placement)
                         painter.begin(frame, playback.texture_px, playback.model, video.fps)
                     estimate = playback.estimate(i) if playback.recorded_model is not None else None
                     painter.frame(frame, Observation(playback.W[i].T, playback.visible[i]), estimate)
@@ -143,7 +146,8 @@ def play(command: Retexture, painter: Painter, progress: Progress) -> Played:
     Raises:
         UsageError: it cannot be read, has no model or no pictures, or an option does not go with it.
     """
-    live = {"--roi": command.roi, "--mask": command.mask, "--rrd": command.rrd, "--view": command.view or None}
+    drawn = {"--roi": command.roi, "--polygon": command.polygon, "--corners": command.corners}
+    live = {**drawn, "--mask": command.mask, "--rrd": command.rrd, "--view": command.view or None}
     for option in (name for name, value in live.items() if value is not None):
         raise UsageError(f"{option} is for videos, not for the recording {command.source}: leave it out")
     playback = Playback.load(Path(command.source))

@@ -3,7 +3,7 @@
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,7 @@ def _read_npz(path: Path) -> Arrays:
 
 def _read_mat(path: Path) -> Arrays:
     from scipy.io import loadmat  # takes its time to load, and few ask
+    from scipy.sparse import issparse
 
     try:
         found: Mapping[str, Any] = loadmat(path)
@@ -64,7 +65,8 @@ def _read_mat(path: Path) -> Arrays:
         raise TrackingError(f"{path} has MATLAB's format 7.3, which is not read: save(..., '-v7')") from None
     except Exception as error:  # damaged files raise a dozen different things
         raise TrackingError(f"{path} is no .mat file, or damaged ({error})") from None
-    return dict(_of_structs((name, value) for name, value in found.items() if isinstance(value, np.ndarray)))
+    whole = ((name, cast(Any, value).toarray() if issparse(value) else value) for name, value in found.items())
+    return dict(_of_structs((name, value) for name, value in whole if isinstance(value, np.ndarray)))
 
 
 def _of_structs(found: Iterable[tuple[str, NDArray[Any]]]) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -82,5 +84,7 @@ def _of_structs(found: Iterable[tuple[str, NDArray[Any]]]) -> Iterator[tuple[str
 def _of_cells(value: NDArray[Any]) -> NDArray[Any]:
     """The matrices in a MATLAB cell array, if they are alike, as one array."""
     if value.dtype != object or len({np.shape(cell) for cell in value.flat}) != 1:
+        return value
+    if any(np.asarray(cell).dtype.kind not in "biuf" for cell in value.flat):
         return value
     return np.stack(list(value.flat))

@@ -1,5 +1,6 @@
 """A rest shape from a mesh file (OBJ, PLY, GLB, STL, OFF)."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,9 @@ def load_mesh(path: Path) -> tuple[Array, Mesh]:
     if not path.is_file():
         raise UsageError(f"no mesh file {path}: give --rest-shape auto, solid, sheet, rigid, plane, or an existing file")
     try:
-        loaded = trimesh.load_mesh(path, process=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # vertices that are in no triangle have no place in a texture
+            loaded = trimesh.load_mesh(path, process=False, maintain_order=True)
         vertices, faces = np.asarray(loaded.vertices, np.float64), np.asarray(loaded.faces, np.int64)
     except Exception as error:  # trimesh's readers raise whatever comes
         raise UsageError(f"cannot read the mesh {path}: {error or type(error).__name__}") from None

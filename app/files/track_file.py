@@ -31,7 +31,7 @@ def load_tracks(path: Path) -> Tracks:
     Raises:
         TrackingError: the file is missing, damaged, lacks `W` and true shapes, or its arrays do not fit.
     """
-    return _tracks(_named(read_arrays(path)), path)
+    return _tracks(_named(read_arrays(path)), path).with_square_pixels()
 
 
 def _tracks(arrays: Arrays, path: Path) -> Tracks:
@@ -42,6 +42,7 @@ def _tracks(arrays: Arrays, path: Path) -> Tracks:
         raise TrackingError(problem)
     try:
         K, S = (_numbers(name, arrays) if name in arrays else None for name in ("K", "S_gt"))
+        S = None if S is None else _known(S)
         W, note = (_numbers("W", arrays), "") if S is None or "W" in arrays else _projected(S, K)
         visible = _flags("visible", arrays)
         if visible is None:
@@ -55,7 +56,7 @@ def _tracks(arrays: Arrays, path: Path) -> Tracks:
             S, gt_frames = _told(S, gt_frames)
         tracks = Tracks(W, visible, K, S, gt_frames, note)
         check_extent(tracks.W, tracks.visible)
-        return tracks.with_square_pixels()
+        return tracks
     except TrackingError as error:
         raise TrackingError(f"{path}: {error}") from None
 
@@ -91,7 +92,7 @@ def _named(arrays: Arrays) -> Arrays:
     called = {name: name for name in arrays}
     for name, others in ALSO.items():
         for other in () if name == "S_gt" and "Upsilon" in arrays else others:  # shapes estimated here are no truth
-            if other in arrays and arrays[other].ndim > 1:
+            if other in arrays and arrays[other].ndim > 1 and arrays[other].size > 1:
                 called.setdefault(name, other)
     named = {name: arrays[other] for name, other in called.items()}
     return {**named, "K": np.eye(3)} if called.get("W") == "m" else named
@@ -108,9 +109,14 @@ def _told(S: Array, frames: Indices) -> tuple[Array, Indices]:
     """True shapes (K, 3, P) of frames (K,) but those that know too few points; none is at the origin: no camera sees it."""
     if S.ndim != 3 or S.shape[1] != 3 or frames.shape != (len(S),):
         return S, frames
-    S = np.where((S == 0).all(axis=1, keepdims=True), np.nan, S)
+    S = _known(S)
     told = known_points(S).sum(axis=1) >= FEWEST_KNOWN
     return (S[told], frames[told]) if told.any() else (S, frames)
+
+
+def _known(S: Array) -> Array:
+    """Shapes with NaN for points at the origin: no camera sees it."""
+    return np.where((S == 0).all(axis=1, keepdims=True), np.nan, S) if S.ndim == 3 else S
 
 
 def _names(arrays: Arrays) -> str:
@@ -125,7 +131,7 @@ def _numbers(name: str, arrays: Arrays) -> Array:
     if rows is None:
         return array
     if array.ndim == 2 and len(array) % rows == 0:
-        if _by_coordinate(array):
+        if _by_coordinate(array, rows):
             return array.reshape(rows, -1, array.shape[1]).swapaxes(0, 1)
         return array.reshape(-1, rows, array.shape[1])
     if array.ndim == 3 and array.shape[1] == 3 and rows == 2 and (array[:, 2] == 1).all():  # homogeneous
@@ -135,7 +141,7 @@ def _numbers(name: str, arrays: Arrays) -> Array:
     return array
 
 
-def _by_coordinate(matrix: Array) -> bool:
+def _by_coordinate(matrix: Array, count: int) -> bool:
     """Whether the rows of a matrix (n, P) are one coordinate of all frames, then the next, not frame after frame.
 
     Then rows beside each other are alike: what moves looks like it did the frame before, but x is not like y.
@@ -143,8 +149,12 @@ def _by_coordinate(matrix: Array) -> bool:
     rows = np.where(matrix == 0, np.nan, matrix)  # some data sets write so what is hidden
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # rows of which nothing is known
-        apart, extent = _deviation(np.diff(rows, axis=0)), _deviation(rows)
-        return bool(np.nanmedian(apart / np.maximum(extent[1:], extent[:-1])) < ALIKE)
+        extent = _deviation(rows)
+        near, far = (
+            np.nanmedian(_deviation(rows[k:] - rows[:-k]) / np.maximum(extent[k:], extent[:-k])) for k in (1, count)
+        )
+        # Along a diagonal x is like y, too: but each is more like itself in the next frame.
+        return bool(near < ALIKE and near <= 2 * far)
 
 
 def _deviation(rows: Array) -> Array:
@@ -158,7 +168,8 @@ def _flags(name: str, arrays: Arrays) -> Flags | None:
     array = arrays[name]
     if array.dtype.kind not in "biu" and not np.isin(array, (0, 1)).all():
         raise TrackingError(f"{name} holds {array.dtype}, but true or false is needed")
-    return array.astype(bool)
+    flags = array.astype(bool)
+    return flags.reshape(len(flags), -1) if flags.ndim == 3 and 1 in flags.shape[1:] else flags  # rows in cells
 
 
 def _frame_numbers(arrays: Arrays) -> Indices | None:

@@ -153,7 +153,7 @@ def writable_folder(folder: Path, replaced: Iterable[str]) -> Iterator[Path]:
     Raises:
         UsageError: the files cannot be written.
     """
-    part = unfinished(folder)
+    part = unfinished(folder.resolve())
     try:
         part.mkdir()
         yield part

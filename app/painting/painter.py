@@ -47,6 +47,11 @@ class Painter:
         """Mean time of painting a frame."""
         return self._elapsed_s * 1e3 / self.painted if self.painted else None
 
+    @property
+    def begun(self) -> bool:
+        """Whether there is a first object: the placement is of it."""
+        return self._first is not None
+
     def begin(self, first: Frame, points_px: Array, model: Model, fps: float) -> None:
         """The first frame, the vertices (p, 2) px in it, the model, and the rate of the video.
 

@@ -176,6 +176,8 @@ def read_picture(path: Path) -> Image:
     except OSError as error:
         raise UsageError(f"cannot read the texture {path}: {error.strerror}") from error
     picture = cv2.imdecode(encoded, cv2.IMREAD_UNCHANGED) if encoded.size else None
+    if picture is not None and (picture.ndim == 2 or picture.shape[2] == 3):  # turned as the camera was held
+        picture = cv2.imdecode(encoded, cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH)
     if picture is None:
         raise UsageError(f"the texture {path} is not a picture that can be read: save it as PNG")
     if picture.dtype == np.uint16:

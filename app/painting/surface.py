@@ -45,7 +45,6 @@ class Surface:
     Attributes:
         net: in the first frame.
         shape: rows and columns of its nodes.
-        region: as given.
     """
 
     def __init__(self, reference_px: Array, mesh: Mesh, quad: Array, region: Mask | None, *, sheet: bool = False) -> None:
@@ -55,7 +54,6 @@ class Surface:
         to_net = homography(quad, np.array(((0, 0), (columns, 0), (columns, rows), (0, rows)), float))
         grid = np.stack(np.meshgrid(np.arange(columns + 1.0), np.arange(rows + 1.0)), axis=-1).reshape(-1, 2)
         self.net, self._grid = Net(mapped(grid, cast(Array, np.linalg.inv(to_net))), net_faces(columns, rows)), grid
-        self.region = region
         if region is not None:
             self.net = Net(self.net.nodes_px, faces_in(self.net, region))
         self._to_net, self.shape = to_net, (rows + 1, columns + 1)

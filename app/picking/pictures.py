@@ -45,8 +45,9 @@ class Pictures:
             UsageError: there is no such frame.
         """
         if not self.live and number != self._at:
+            video = Video(self._source, number)
             self._video.close()
-            self._video = Video(self._source, number)
+            self._video = video
             self._at, self._frames = number, iter(self._video)
         frame = self._next(self._frames, number)
         self._at += 1

@@ -12,7 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from app.commands.batch import make_jobs, own_options
 from app.commands.batch_job import Job, own_outputs, reason
+from app.options.batch import Batch
+from app.terminal.errors import UsageError
 from tests.app.command_line import ENVIRONMENT, PROGRAM, Command
 from tests.synthetic_run import verify
 
@@ -220,3 +223,17 @@ def test_reasons_are_told_in_one_line(code: int, err: str, words: str) -> None:
 def test_every_job_has_files_of_its_own() -> None:
     options = ("--points", "100", "--shapes-out", "out/s.npz")
     assert own_outputs(options, "clip") == ["--points", "100", "--shapes-out", "out/s-clip.npz"]
+
+
+def test_lines_of_a_table_without_a_video(tmp_path: Path) -> None:
+    table = tmp_path / "clips.csv"
+    table.write_text("roi,video\n,a.mp4\n,\n")  # spreadsheets end so
+    assert list(own_options(table)) == [str(tmp_path / "a.mp4")]
+    table.write_text("roi,video\n1 2 3 4\n")
+    with pytest.raises(UsageError, match="a line without a video: 1 2 3 4"):
+        own_options(table)
+
+
+def test_addresses_that_differ_in_what_is_asked_have_names_of_their_own(tmp_path: Path) -> None:
+    videos = [f"http://here/watch?v={name}" for name in ("abc", "def")]
+    assert len({job.recording for job in make_jobs(Batch(videos, out=tmp_path))}) == 2

@@ -17,7 +17,7 @@ from app.playback.playback import Playback
 from app.terminal.errors import UsageError
 from app.terminal.progress import Progress
 from tests.app.card import card
-from tests.app.command_line import Command
+from tests.app.command_line import Command, still, turning, write_video
 from tests.synthetic_run import SIZE, picture, write_run
 from tracking.video import Video
 
@@ -188,3 +188,12 @@ def test_recordings_are_recognised(tmp_path: Path, name: str, content: bytes, fo
     (tmp_path / name).write_bytes(content)
     assert is_recording(str(tmp_path / name)) is found
     assert not is_recording("0")
+
+
+def test_a_video_that_begins_black_is_painted_from_where_its_recording_begins(tmp_path: Path, texture: Path) -> None:
+    pictures = [*(0 * picture for picture in still(8)), *turning(20)]
+    path, out = write_video(tmp_path / "late.mp4", pictures), tmp_path / "out.mp4"
+    painted = retexture(command(path, texture, out, points=100), Progress())
+    frames = frames_of(out)
+    assert painted.painted_frames == len(frames) == 20
+    assert min(float(frame.mean()) for frame in frames) > 20

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from app.files.video_out import writable_video
-from app.painting.picture import Texture
+from app.painting.picture import Texture, read_picture
 from tests.app.card import card
 from tracking.video import Video
 
@@ -53,3 +53,12 @@ def test_the_picture_s_own_size_and_alpha_are_read(tmp_path: Path) -> None:
         assert read.shape == (9, 7, 4)
         assert np.abs(read[..., 0].astype(int) - 100).max() <= 1
         assert read[0, 0, 3] == (128 if name == "clear" else 255)
+
+
+def test_a_photograph_is_as_its_camera_was_held(tmp_path: Path) -> None:
+    whole, jpeg = np.full((40, 80, 3), 200, np.uint8), tmp_path / "photo.jpg"
+    data = cv2.imencode(".jpg", whole)[1].tobytes()
+    tiff = b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"  # orientation 6: a quarter turn
+    exif = b"Exif\0\0" + tiff
+    jpeg.write_bytes(data[:2] + b"\xff\xe1" + (len(exif) + 2).to_bytes(2, "big") + exif + data[2:])
+    assert read_picture(jpeg).shape[:2] == (80, 40)
