@@ -19,6 +19,8 @@ ALSO = {  # what data sets call them; m is K⁻¹ p
 }
 ROWS = {"W": 2, "W_px": 2, "S_gt": 3}  # of a frame, in matrices and arrays of any order
 ALIKE = 0.3  # of its extent: rows of a matrix that differ by less are of one coordinate
+EXCHANGED = "W is taken for {} frames of {} points, but looks like points of frames: give (F, 2, P), or (F, P, 2)"
+OFTEN, DENSE = 2.0, 20  # times the way from point to point; usual tracks have 0.05 to 0.4
 PROJECTED = "no W: the true shapes are looked at {}"
 
 
@@ -54,7 +56,7 @@ def _tracks(arrays: Arrays, path: Path) -> Tracks:
             gt_frames = np.arange(len(W))
         if S is not None and gt_frames is not None:
             S, gt_frames = _told(S, gt_frames)
-        tracks = Tracks(W, visible, K, S, gt_frames, note)
+        tracks = Tracks(W, visible, K, S, gt_frames, note or exchanged(W, visible))
         check_extent(tracks.W, tracks.visible)
         return tracks
     except TrackingError as error:
@@ -117,6 +119,20 @@ def _told(S: Array, frames: Indices) -> tuple[Array, Indices]:
 def _known(S: Array) -> Array:
     """Shapes with NaN for points at the origin: no camera sees it."""
     return np.where((S == 0).all(axis=1, keepdims=True), np.nan, S) if S.ndim == 3 else S
+
+
+def exchanged(W: Array, visible: Flags) -> str:
+    """A note where tracks (F, 2, P) look as if frames and points were exchanged: what moves does so by little in a frame.
+
+    Neighbours on a dense grid are near each other, too: not of many more points than frames.
+    """
+    if W.ndim != 3 or W.shape[::2] != visible.shape or min(visible.shape) < 3 or visible.shape[1] > DENSE * len(W):
+        return ""
+    seen = np.where(visible[:, None], W, np.nan)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # frames or points of which nothing is known
+        in_frames, beside = (float(np.nanmedian(np.abs(np.diff(seen, axis=axis)))) for axis in (0, 2))
+    return EXCHANGED.format(*visible.shape) if in_frames > OFTEN * beside else ""
 
 
 def _names(arrays: Arrays) -> str:

@@ -32,6 +32,13 @@ def test_the_rows_of_what_lies_along_a_diagonal(tmp_path: Path, frames: int) -> 
         np.testing.assert_array_equal(load_tracks(tmp_path / "tracks.npz").W, some)
 
 
+def test_points_before_frames_are_told(tmp_path: Path) -> None:
+    scattered = RNG.uniform(0, 400, (2, 60)) + np.cumsum(RNG.normal(0, 2, (40, 2, 1)), axis=0)
+    for W, told in ((scattered, False), (scattered.transpose(2, 0, 1), True)):
+        np.savez(tmp_path / "tracks.npz", W=W)
+        assert ("points of frames" in load_tracks(tmp_path / "tracks.npz").note) == told
+
+
 def test_points_at_the_origin_of_truth_alone_are_not_seen(tmp_path: Path) -> None:
     S = np.concatenate([W, np.full((F, 1, P), 900.0)], axis=1)
     S[:, :, :4] = 0.0
