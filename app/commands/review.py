@@ -83,7 +83,7 @@ def review(command: Review, progress: Progress) -> Comparison:
         from app.playback.comparison import show
         from app.recording.viewer import spawned_viewer
 
-        show(both, url or spawned_viewer())
+        show(both, url or spawned_viewer(progress.log))
     return Comparison([facts(one.playback, one.measured) for one in both])
 
 

@@ -53,13 +53,13 @@ def opened_viewer(path: Path | None, output: "Output", log: Callable[[str], None
     if output.connect:
         return running_viewer(output.connect)
     if output.serve:
-        url = spawned_viewer(in_browser=True)
+        url = spawned_viewer(log, in_browser=True)
         log(f"watch it in a browser of this machine: http://127.0.0.1:{WEB_PORT}/?url={quote(url, safe='')}")
         return url
     if not output.view:
         return None
     try:
-        return spawned_viewer()
+        return spawned_viewer(log)
     except UsageError as error:
         if path is None:
             raise
@@ -73,13 +73,17 @@ def answers(url: str) -> bool:
     return listening(str(parts.hostname), parts.port or PORT)
 
 
-def spawned_viewer(*, in_browser: bool = False) -> str:
+def spawned_viewer(log: Callable[[str], None], *, in_browser: bool = False) -> str:
     """The URL of a viewer on this machine, started unless one is running already, in a window or for a browser.
+
+    `log` is told of one that is running, and of one without a window, which nobody would find afterwards.
 
     Raises:
         UsageError: it does not start.
     """
-    if not listening("127.0.0.1", PORT):
+    if listening("127.0.0.1", PORT):
+        log(f"a viewer runs at 127.0.0.1:{PORT} already, maybe in a browser: it is shown there")
+    else:
         how = ["--serve-web", "--web-viewer-port", str(WEB_PORT)] if in_browser else ["--expect-data-soon"]
         program = Path(rerun_cli.__file__).with_name("rerun")  # of this very version, whatever is on PATH
         # Not by rr.spawn: it would be open to the whole network.
@@ -97,6 +101,8 @@ def spawned_viewer(*, in_browser: bool = False) -> str:
         sleep(STARTED_S)
         if viewer.poll() is not None:
             raise UsageError("--view: the viewer does not stay (is there a screen?); open the file later")
+        if in_browser:
+            log(f"the viewer goes on when the run has ended: kill {viewer.pid} ends it")
     return f"rerun+http://127.0.0.1:{PORT}/proxy"
 
 

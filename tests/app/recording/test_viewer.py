@@ -35,7 +35,10 @@ def program(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 def test_it_listens_on_this_machine_only(program: Path) -> None:
     program.write_text(f"#!{sys.executable}\n{LISTENS}")
     program.chmod(0o755)
-    assert viewer.spawned_viewer() == f"rerun+http://127.0.0.1:{viewer.PORT}/proxy"
+    told: list[str] = []
+    for _ in range(2):
+        assert viewer.spawned_viewer(told.append) == f"rerun+http://127.0.0.1:{viewer.PORT}/proxy"
+    assert ["already" in line for line in told] == [True]  # the second time it runs
     assert program.with_name("rerun.bind").read_text() == "127.0.0.1"
 
 
@@ -48,7 +51,8 @@ def test_in_a_browser_the_address_is_told(program: Path) -> None:
     url = viewer.opened_viewer(None, Output(serve=True), told.append)
     assert url == f"rerun+http://127.0.0.1:{viewer.PORT}/proxy"
     assert viewer.answers(url)
-    [line] = told
+    stays, line = told
+    assert "goes on when the run has ended" in stays
     assert f"http://127.0.0.1:{viewer.WEB_PORT}/?url=rerun%2Bhttp" in line
 
 
@@ -70,4 +74,4 @@ def test_one_that_does_not_start_is_told(program: Path, text: str | None) -> Non
         program.write_text(text)
         program.chmod(0o755)
     with pytest.raises(UsageError, match="--view: the viewer does not start"):
-        viewer.spawned_viewer()
+        viewer.spawned_viewer(print)
