@@ -89,7 +89,14 @@ def test_a_run_without_standard_files(tmp_path: Path, video: Path, closed: int) 
 @pytest.mark.parametrize("after_s", [0.1, 0.25])
 def test_ctrl_c_before_anything_has_begun(tmp_path: Path, video: Path, after_s: float) -> None:
     command = [sys.executable, "-m", "modeshape", "run", str(video), *OPTIONS, "--frames", ":10"]
-    with subprocess.Popen(command, cwd=tmp_path, env=command_line.ENVIRONMENT, stderr=subprocess.PIPE, text=True) as run:
+    with subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        env=command_line.ENVIRONMENT,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # background jobs ignore it
+    ) as run:
         time.sleep(after_s)
         run.send_signal(signal.SIGINT)
         _, told = run.communicate(timeout=60)
