@@ -83,7 +83,7 @@ def load_truth(path: Path) -> Truth:
         frames = _frame_numbers(arrays)
         assert frames is not None
         K = _numbers("K", arrays) if "K" in arrays else None
-        W_px, (S, told) = _numbers("W_px", arrays), _told(_numbers("S_gt", arrays), frames)
+        W_px, (S, told) = _numbers("W_px", arrays), _told(_known(_numbers("S_gt", arrays)), frames)
         return Truth(W_px[np.isin(frames, told)] if len(W_px) == len(frames) else W_px, S, told, K)
     except TrackingError as error:
         raise TrackingError(f"{path}: {error}") from None
@@ -108,10 +108,9 @@ def _projected(S: Array, K: Array | None) -> tuple[Array, str]:
 
 
 def _told(S: Array, frames: Indices) -> tuple[Array, Indices]:
-    """True shapes (K, 3, P) of frames (K,) but those that know too few points; none is at the origin: no camera sees it."""
+    """True shapes (K, 3, P) of frames (K,) but those that know too few points."""
     if S.ndim != 3 or S.shape[1] != 3 or frames.shape != (len(S),):
         return S, frames
-    S = _known(S)
     told = known_points(S).sum(axis=1) >= FEWEST_KNOWN
     return (S[told], frames[told]) if told.any() else (S, frames)
 

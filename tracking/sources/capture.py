@@ -134,8 +134,14 @@ def few_bits(source: str) -> float | None:
     if not Path(source).is_file():
         return None
     capture = cv2.VideoCapture(source)
-    bits = bits_per_px(cast(Capture, capture)) if capture.isOpened() else None
+    bits = few_bits_of(cast(Capture, capture)) if capture.isOpened() else None
     capture.release()
+    return bits
+
+
+def few_bits_of(capture: Capture) -> float | None:
+    """The same of an open video."""
+    bits = bits_per_px(capture)
     return bits if bits is not None and bits < FEW_BITS else None
 
 
@@ -176,7 +182,7 @@ def open_capture(source: str, closing: threading.Event, log: Log, *, decodes: bo
     if not os.access(path, os.R_OK):
         raise TrackingError(f"{source} cannot be read: permission denied")
     file = cast(Capture, cv2.VideoCapture(source)) if decodes else Decoder(source)
-    if (bits := few_bits(source)) is not None:
+    if (bits := few_bits_of(file)) is not None:
         log(f"{source} is compressed to {bits:.2g} bits a pixel: little texture is left to follow; export it with more")
     return squared(file, source, log)
 

@@ -65,6 +65,9 @@ class Decoder:
         return {
             cv2.CAP_PROP_POS_MSEC: 1000 * ((self._frame.time or 0.0) - self._began_s) if self._frame else 0.0,
             cv2.CAP_PROP_FPS: rate,
+            cv2.CAP_PROP_BITRATE: float((self._file.bit_rate or 0) // 1000),
+            cv2.CAP_PROP_FRAME_WIDTH: float(stream.width),
+            cv2.CAP_PROP_FRAME_HEIGHT: float(stream.height),
             cv2.CAP_PROP_ORIENTATION_META: float(self._rotation),
             cv2.CAP_PROP_FRAME_COUNT: float(stream.frames or round(rate * seconds)),
             cv2.CAP_PROP_SAR_NUM: float(aspect.numerator) if aspect else 0.0,

@@ -82,10 +82,12 @@ def affine_structure(W: Array, visible: Mask) -> tuple[Array, Array, Array]:
     Vt = np.linalg.svd((filled - t[:, :, None]).reshape(2 * F, p), full_matrices=False)[2]
     S = Vt[:3] * np.sqrt(p)
     A = np.zeros((F, 2, 3))
-    previous, free = (
-        np.inf,
-        max(2 * h.sum() - 8 * F - 3 * p, FEWEST_FREE * h.sum()),
-    )  # entries that A, t and S do not take up
+    free = max(2 * h.sum() - 8 * F - 3 * p, FEWEST_FREE * h.sum())  # entries that A, t and S do not take up
+    previous = np.inf
+
+    def left_over() -> float:
+        return float(((known - (A @ S + t[:, :, None]) * h[:, None]) ** 2).sum())
+
     for _ in range(SWEEPS):
         S = (S - S.mean(axis=1, keepdims=True)) / S.std(axis=1, keepdims=True).clip(1e-12)
         B = np.concatenate([S, np.ones((1, p))])
@@ -93,10 +95,10 @@ def affine_structure(W: Array, visible: Mask) -> tuple[Array, Array, Array]:
         A, t = motion[:, :, :3], motion[:, :, 3]
         gram = np.einsum("fci,fp,fcj->pij", A, h, A, optimize=True)
         # S has variance 1: a few noisy entries are not to carry a point far away.
-        gram += ((known - (A @ S + t[:, :, None]) * h[:, None]) ** 2).sum() / free * np.eye(3)
+        gram += left_over() / free * np.eye(3)
         right = np.einsum("fci,fcp->pi", A, (known - t[:, :, None]) * h[:, None], optimize=True)
         S = weighted_solve(gram, right[:, None, :])[:, 0].T
-        error = float(((known - (A @ S + t[:, :, None]) * h[:, None]) ** 2).sum())
+        error = left_over()
         if error > previous * (1 - 1e-6):
             break
         previous = error

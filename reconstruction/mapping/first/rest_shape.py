@@ -46,18 +46,17 @@ def rigid(W: Array, visible: Mask, camera: Camera) -> RestShape:
     start = factorize_often_seen(W, visible)
     start = replace(start, t=start.t - camera.center_px)
     starts = [start, start.mirrored()] if camera.perspective else [start]
-    found = (bundle_adjust(W, visible, s, camera) for s in starts)
-    motion, rms = min(found, key=lambda one: counted(W, visible, camera, *one))
+    off, places = W - camera.center_px[:, None], first_image(W, visible)
+
+    def counted(motion: RigidMotion, rms: float) -> float:
+        """The mean square px² left over, more if the shape is hollow: things are seen from outside."""
+        return rms**2 * disbelief(Bundle(motion, 1 / camera.focal_px), off, visible, places)
+
+    motion, rms = min((bundle_adjust(W, visible, s, camera) for s in starts), key=lambda one: counted(*one))
     motion = motion.in_first_frame()
     turn = view_turn_degrees(motion.R)
     note = f"rigid shape from {len(W)} frames, turned {turn:.0f}°, reprojection error {rms:.2f} px"
     return RestShape("rigid", motion, note)
-
-
-def counted(W: Array, visible: Mask, camera: Camera, motion: RigidMotion, rms: float) -> float:
-    """The mean square px² left over, more if the shape is hollow: things are seen from outside."""
-    bundle = Bundle(motion, 1 / camera.focal_px)
-    return rms**2 * disbelief(bundle, W - camera.center_px[:, None], visible, first_image(W, visible))
 
 
 def factorize_often_seen(W: Array, visible: Mask) -> RigidMotion:

@@ -59,7 +59,7 @@ def test_both_decoders_give_the_same(tmp_path: Path, turn: int) -> None:
     turned = tmp_path / "turned.mp4"
     turned.write_bytes(with_rotation(path.read_bytes(), turn))
     capture, decoder = cv2.VideoCapture(str(turned)), Decoder(str(turned))
-    for name in ("POS_MSEC", "FPS", "FRAME_COUNT", "SAR_NUM", "SAR_DEN"):
+    for name in ("POS_MSEC", "FPS", "FRAME_COUNT", "SAR_NUM", "SAR_DEN", "BITRATE"):
         assert decoder.get(getattr(cv2, f"CAP_PROP_{name}")) == capture.get(getattr(cv2, f"CAP_PROP_{name}"))
     for _ in range(3):
         assert capture.grab()
